@@ -1,0 +1,1 @@
+"""The face: rig file, joint mapping, jaw, skinning, display."""

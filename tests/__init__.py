@@ -1,0 +1,1 @@
+"""Tests mirror the packages; the truth comes from outside."""

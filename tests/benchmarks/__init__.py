@@ -1,0 +1,1 @@
+"""Figures, each beside a peer in the same run where there is one. `python -m tests.benchmarks [NAME ...]`."""
