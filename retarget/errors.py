@@ -1,7 +1,7 @@
 """What can go wrong, as one sentence a user can act on.
 
-Every error that a user can cause or meet is a `RetargetError`; the command line prints its text and exits with status 1.
-A message names the thing, what was expected and the next step.
+Every error that a user can cause or meet is a `RetargetError`; the command line prints its text and exits with status
+1. A message names the thing, what was expected and the next step.
 """
 
 

@@ -1,7 +1,7 @@
 """The values that cross packages: what the markers are, where they are, and how the face stands.
 
-Frames: ``world`` is the capture volume, ``head`` the skull: origin at the rest position of the rig's head joint, +Y up, +Z out of
-the face, +X to the performer's left, in the performer's own metres. Missing data has one meaning: NaN.
+Frames: ``world`` is the capture volume, ``head`` the skull: origin at the rest position of the rig's head joint, +Y
+up, +Z out of the face, +X to the performer's left, in the performer's own metres. Missing data has one meaning: NaN.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ class MarkerLayout:
     names: tuple[str, ...]
     """One unique name per marker, (M,)."""
     sites: tuple[str, ...] = ()
-    """The rig site that each marker drives, "" where it drives none; (M,), or empty when nothing is known of the rig."""
+    """The rig site that each marker drives, "" where it drives none; (M,), or empty when nothing is known of the
+    rig.
+    """
     head: tuple[int, ...] = ()
     """Indices of the markers that move with the skull alone and so carry the head's motion."""
     rest: NDArray[np.float64] | None = None
@@ -36,12 +38,16 @@ class MarkerFrame:
     number: int
     """The sender's frame number."""
     time_s: float
-    """Instant of the exposure: the sender's clock mapped to the local monotonic clock [s]; a file's own time for a file."""
+    """Instant of the exposure: the sender's clock mapped to the local monotonic clock [s]; a file's own time for a
+    file.
+    """
     received_s: float
     """Local monotonic time at which the frame arrived [s]; equal to `time_s` for a file."""
     layout: MarkerLayout
     positions: NDArray[np.float64]
-    """(M, 3) [m]; a NaN row is a marker that was not seen. In ``world``, or in ``head`` once `T_world_head` is given."""
+    """(M, 3) [m]; a NaN row is a marker that was not seen. In ``world``, or in ``head`` once `T_world_head` is
+    given.
+    """
     T_world_head: NDArray[np.float64] | None = None
     """(4, 4), set by the stabilising stage, which takes `positions` from ``world`` to ``head``."""
     unlabelled: NDArray[np.float64] | None = None

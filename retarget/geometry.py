@@ -1,7 +1,7 @@
 """Rigid transforms, quaternions and fits of point sets. numpy only.
 
-Quaternions are xyzw and of unit length. ``T_a_b`` maps coordinates in b to a: ``p_a = T_a_b @ p_b``. Every function takes any number of leading
-axes unless it says otherwise.
+Quaternions are xyzw and of unit length. ``T_a_b`` maps coordinates in b to a: ``p_a = T_a_b @ p_b``. Every function
+takes any number of leading axes unless it says otherwise.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ def inverse(T_a_b: Array) -> Array:
 
 def apply(T_a_b: Array, p_b: ArrayLike) -> Array:
     """p_a (N, 3) from one T_a_b (4, 4) and p_b (N, 3); NaN rows stay NaN."""
-    return np.asarray(p_b, float) @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+    p_a: Array = np.asarray(p_b, float) @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+    return p_a
 
 
 def quat_from_axis_angle(axis: ArrayLike, angle: ArrayLike) -> Array:
@@ -62,7 +63,8 @@ def quat_multiply(a: ArrayLike, b: ArrayLike) -> Array:
 
 def quat_conjugate(q: ArrayLike) -> Array:
     """The opposite turn (..., 4)."""
-    return np.asarray(q, float) * np.array([-1.0, -1.0, -1.0, 1.0])
+    conjugate: Array = np.asarray(q, float) * np.array([-1.0, -1.0, -1.0, 1.0])
+    return conjugate
 
 
 def matrix_from_quat(q: ArrayLike) -> Array:
@@ -112,25 +114,29 @@ def slerp(a: ArrayLike, b: ArrayLike, fraction: ArrayLike) -> Array:
     a = np.asarray(a, float)
     b = align_hemisphere(b, a)
     f = np.asarray(fraction, float)[..., None]
-    angle = np.arccos(np.clip(np.sum(a * b, axis=-1, keepdims=True), -1.0, 1.0))
+    # half the chords of the sum and the difference: exact for small angles, where the arc cosine loses half the digits
+    angle = 2 * np.arctan2(np.linalg.norm(a - b, axis=-1, keepdims=True), np.linalg.norm(a + b, axis=-1, keepdims=True))
     near = angle < 1e-6  # the sine vanishes; the chord is the arc to rounding
     sine = np.where(near, 1.0, np.sin(angle))
     q = np.where(near, (1 - f) * a + f * b, (np.sin((1 - f) * angle) * a + np.sin(f * angle) * b) / sine)
-    return q / np.linalg.norm(q, axis=-1, keepdims=True)
+    unit: Array = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return unit
 
 
 def kabsch(p_b: Array, p_a: Array, weights: Array | None = None) -> Array:
     """T_a_b (4, 4) that minimises sum w |p_a - T_a_b p_b|^2 over rigid motions, for p_b, p_a (N, 3), weights (N,).
 
-    All rows must be finite, and at least three of positive weight must not lie on one line, or the rotation is arbitrary about
-    that line. Kabsch 1976, with the reflection ruled out (Umeyama 1991, eq. 40).
+    All rows must be finite, and at least three of positive weight must not lie on one line, or the rotation is
+    arbitrary about that line. Kabsch 1976, with the reflection ruled out (Umeyama 1991, eq. 40).
     """
     T, _ = _fit(p_b, p_a, weights)
     return T
 
 
 def umeyama(p_b: Array, p_a: Array, weights: Array | None = None) -> tuple[Array, float]:
-    """(T_a_b, s) that minimises sum w |p_a - (s R p_b + t)|^2; T_a_b holds R and t. As `kabsch`, with scale (Umeyama 1991, eq. 42)."""
+    """(T_a_b, s) that minimises sum w |p_a - (s R p_b + t)|^2; T_a_b holds R and t. As `kabsch`, with scale (Umeyama
+    1991, eq. 42).
+    """
     T, s = _fit(p_b, p_a, weights)
     w = np.ones(len(p_b)) if weights is None else np.asarray(weights, float)
     mean_a, mean_b = np.average(p_a, axis=0, weights=w), np.average(p_b, axis=0, weights=w)

@@ -1,0 +1,1 @@
+"""Poses become files for other programs."""
