@@ -99,8 +99,8 @@ def quat_from_matrix(R: ArrayLike) -> Array:
         axis=-2,
     )
     best = np.take_along_axis(candidates, np.argmax(squares, axis=-1)[..., None, None], axis=-2)[..., 0, :]
-    best = best / np.linalg.norm(best, axis=-1, keepdims=True)
-    return np.where(best[..., 3:] < 0, -best, best)
+    q: Array = best / np.linalg.norm(best, axis=-1, keepdims=True)
+    return align_hemisphere(q, IDENTITY_QUAT)
 
 
 def align_hemisphere(q: ArrayLike, reference: ArrayLike) -> Array:
