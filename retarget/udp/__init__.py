@@ -1,0 +1,1 @@
+"""Datagrams and streams: codecs between bytes and values, sessions, and the one file that opens sockets."""
