@@ -7,7 +7,7 @@ or NaN residuals. Source: NatNetTypes.h of the vendor's SDKs 2.5 to 4.3, checked
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -214,7 +214,7 @@ class FrameOfData:
 
     number: int
     marker_sets: tuple[MarkerSet, ...] = ()
-    other_markers: NDArray[np.float32] = _NO_POSITIONS
+    other_markers: NDArray[np.float32] = field(default_factory=lambda: _NO_POSITIONS)
     """(n, 3) [m]: markers of no asset, the older way of telling (`labelled` has them too, as unlabelled, from 3.0)."""
     bodies: RigidBodies = _NO_BODIES
     skeletons: tuple[Skeleton, ...] = ()

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
     from retarget.udp.natnet.version import BitstreamLayout
 
-POSITION = np.dtype("<f4")
-"""Positions are (n, 3) of these."""
+FLOAT: np.dtype[np.float32] = np.dtype("<f4")
+INT: np.dtype[np.int32] = np.dtype("<i4")
 
 _MARKER: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = [
     ("id", "<i4"),
