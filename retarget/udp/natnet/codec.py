@@ -1,7 +1,7 @@
 """NatNet datagrams to values and back: no socket, no clock, no state.
 
-A datagram is ``u16 id, u16 payload size, payload``, little-endian. The size field is telemetry, as clients fill it wrongly:
-the length of the datagram counts. All input is hostile; whatever it holds, `decode` returns a value or raises
+A datagram is ``u16 id, u16 payload size, payload``, little-endian. The size field is telemetry, as clients fill it
+wrongly: the length of the datagram counts. All input is hostile; whatever it holds, `decode` returns a value or raises
 `ProtocolError`.
 """
 
@@ -39,8 +39,8 @@ def decode(datagram: bytes, version: Bitstream | None = None) -> Message:
     """Read one datagram.
 
     `version` is the bitstream of frames and model definitions, None as long as the server has not told it; every other
-    message is the same in all versions. Raise `ProtocolError`, and nothing else, when the bytes do not follow the protocol.
-    A message whose id is not known is an `Unknown`, not an error.
+    message is the same in all versions. Raise `ProtocolError`, and nothing else, when the bytes do not follow the
+    protocol. A message whose id is not known is an `Unknown`, not an error.
     """
     if len(datagram) < HEADER.size:
         raise ProtocolError(
@@ -59,16 +59,17 @@ def decode(datagram: bytes, version: Bitstream | None = None) -> Message:
 def encode(message: Message, version: Bitstream | None = None) -> bytes:
     """Write one datagram; the inverse of `decode` for the same `version`.
 
-    A frame or model definition of another version is converted: what `version` does not carry is left out, what it adds is
-    zero. Raise `InputError` when the value does not fit: a number too large for its field, a name with a NUL, too many bytes;
-    and `ProtocolError` when there is no such `version`.
+    A frame or model definition of another version is converted: what `version` does not carry is left out, what it adds
+    is zero. Raise `InputError` when the value does not fit: a number too large for its field, a name with a NUL, too
+    many bytes; and `ProtocolError` when there is no such `version`.
     """
     out = Writer()
     kind = _write_payload(out, message, version)
     payload = out.getvalue()
     if len(payload) > MAX_PAYLOAD:
         raise InputError(
-            f"A message of {len(payload)} bytes is too long for a datagram, which carries {MAX_PAYLOAD}; send fewer markers."
+            f"A message of {len(payload)} bytes is too long for a datagram, which carries {MAX_PAYLOAD}; "
+            "send fewer markers."
         )
     header = Writer()
     header.pack(HEADER, kind, len(payload))

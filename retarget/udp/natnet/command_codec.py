@@ -1,8 +1,8 @@
 """The messages of the command channel, from bytes and to bytes; the same in all bitstream versions.
 
-Forms that real clients send and that are accepted: CONNECT as four bytes, with "Ping" and a NUL, with a sender, and with a
-sender and options, behind which up to `MAX_PADDING` NULs may follow (the vendor's sample sends two); one NUL after a message
-that should be empty. Anything else behind the end of a message is refused.
+Forms that real clients send and that are accepted: CONNECT as four bytes, with "Ping" and a NUL, with a sender, and
+with a sender and options, behind which up to `MAX_PADDING` NULs may follow (the vendor's sample sends two); one NUL
+after a message that should be empty. Anything else behind the end of a message is refused.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ READERS: dict[int, Callable[[Cursor], Message]] = {
     MessageId.DISCOVERY: lambda cursor: _read_hello(cursor, Discovery),
     MessageId.UNRECOGNIZED_REQUEST: lambda cursor: UnrecognizedRequest(cursor.rest()),
 }
-"""How the payload of each message is read to its end; frames and model definitions, which need a version, are not here."""
+"""How the payload of each message is read to its end, but for the two that need a version."""
 
 
 def _write_sender(out: Writer, sender: Sender) -> None:

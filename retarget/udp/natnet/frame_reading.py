@@ -1,7 +1,7 @@
 """FRAMEOFDATA from bytes: bitstream 2.5 to 4.3.
 
-From 4.1 every section says how many bytes it has, and a frame whose sections do not add up is refused. A frame ends with four
-zero bytes and nothing behind them, in all versions.
+From 4.1 every section says how many bytes it has, and a frame whose sections do not add up is refused. A frame ends
+with four zero bytes and nothing behind them, in all versions.
 """
 
 from __future__ import annotations

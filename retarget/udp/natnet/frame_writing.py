@@ -1,6 +1,7 @@
 """FRAMEOFDATA to bytes: bitstream 2.5 to 4.3.
 
-A frame read from one version can be written in another: what the other does not carry is left out, what it adds is zero.
+A frame read from one version can be written in another: what the other does not carry is left out, what it adds is
+zero.
 """
 
 from __future__ import annotations
@@ -16,11 +17,15 @@ from retarget.udp.natnet.writer import Writer
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
     from retarget.udp.natnet.framedata import (
         AnalogSamples,
         Asset,
         BodyMarkers,
         FrameOfData,
+        LabelledMarkers,
         MarkerSet,
         RigidBodies,
         Skeleton,

@@ -1,8 +1,9 @@
 """FRAMEOFDATA as values: all that a server says about one instant.
 
-Positions are metres in the server's own axes (as its streaming settings have them), quaternions xyzw. Arrays that come from a
-datagram are read-only views of it. A value holds what its bitstream carried; what a version does not carry is None, zero flags
-or NaN residuals. Source: NatNetTypes.h of the vendor's SDKs 2.5 to 4.3, checked against captured datagrams.
+Positions are metres in the server's own axes (as its streaming settings have them), quaternions xyzw. Arrays that come
+from a datagram are read-only views of it. A value holds what its bitstream carried; what a version does not carry is
+None, zero flags or NaN residuals. Source: NatNetTypes.h of the vendor's SDKs 2.5 to 4.3, checked against captured
+datagrams.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerSet:
-    """The markers of one asset, or of all of them under the name "all"; names in the same order are in the model definition."""
+    """The markers of one asset, or of all under the name "all"; the model definition has names in the same order."""
 
     name: str
     positions: NDArray[np.float32]
@@ -95,10 +96,11 @@ class LabelledMarkers:
     @property
     def measured(self) -> NDArray[np.bool_]:
         """(n,): seen in this frame; neither occluded nor filled in from a model."""
-        return (self.params & (MarkerFlag.OCCLUDED | MarkerFlag.MODEL_FILLED)) == 0
+        return ~self._flag(MarkerFlag.OCCLUDED | MarkerFlag.MODEL_FILLED)
 
     def _flag(self, flag: MarkerFlag) -> NDArray[np.bool_]:
-        return (self.params & flag) != 0
+        raised: NDArray[np.bool_] = (self.params & flag) != 0
+        return raised
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +155,8 @@ class RigidBodies:
     @property
     def tracked(self) -> NDArray[np.bool_]:
         """(n,): found in this frame (from 2.6)."""
-        return (self.params & BodyFlag.TRACKED) != 0
+        tracked: NDArray[np.bool_] = (self.params & BodyFlag.TRACKED) != 0
+        return tracked
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,8 +1,9 @@
 """Every NatNet message as a frozen value; what it says, not how it is written.
 
-FRAMEOFDATA is `framedata.FrameOfData`, MODELDEF `models.ModelDef`; all others are here. What senders leave behind in fields
-(stale memory after a name, a NUL after an empty message) is kept, so that a value writes the very bytes that it was read from.
-Source: NatNetTypes.h and NatNetRequests.h of the vendor's SDKs 2.5 to 4.3, and a captured session of Motive 2.1.
+FRAMEOFDATA is `framedata.FrameOfData`, MODELDEF `models.ModelDef`; all others are here. What senders leave behind in
+fields (stale memory after a name, a NUL after an empty message) is kept, so that a value writes the very bytes that it
+was read from. Source: NatNetTypes.h and NatNetRequests.h of the vendor's SDKs 2.5 to 4.3, and a captured session of
+Motive 2.1.
 """
 
 from __future__ import annotations
@@ -283,7 +284,7 @@ class UnrecognizedRequest:
 
 @dataclass(frozen=True, slots=True)
 class Unknown:
-    """A datagram whose id is not known, kept as it is: a newer server's message is not an error, and a take keeps it."""
+    """A datagram of unknown id, kept as it is: a newer server's message is not an error, and a take keeps it."""
 
     id: int
     payload: bytes

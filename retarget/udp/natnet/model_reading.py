@@ -1,7 +1,8 @@
 """MODELDEF from bytes: bitstream 2.5 to 4.3.
 
-From 4.1 each description tells its size, so that one of an unknown type, or one whose body does not follow its type, is kept
-unread and the others still count: names should not be lost over a camera. Before 4.1 an unknown type hides all that follows.
+From 4.1 each description tells its size, so that one of an unknown type, or one whose body does not follow its type, is
+kept unread and the others still count: names should not be lost over a camera. Before 4.1 an unknown type hides all
+that follows.
 """
 
 from __future__ import annotations

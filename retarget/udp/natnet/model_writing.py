@@ -1,7 +1,7 @@
 """MODELDEF to bytes: bitstream 2.5 to 4.3.
 
-A definition read from one version can be written in another: what the other does not carry is left out, what it adds is empty,
-no rotation and no name.
+A definition read from one version can be written in another: what the other does not carry is left out, what it adds is
+empty, no rotation and no name.
 """
 
 from __future__ import annotations

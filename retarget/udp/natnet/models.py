@@ -129,7 +129,7 @@ class AssetDescription:
 
 @dataclass(frozen=True, slots=True)
 class OpaqueDescription:
-    """A description that was skipped by its size (from 4.1): its type is unknown, or its body does not follow its type."""
+    """A description skipped by its size (from 4.1): its type is unknown, or its body does not follow its type."""
 
     type: int
     body: bytes
@@ -149,7 +149,7 @@ Description: TypeAlias = (
 
 @dataclass(frozen=True, slots=True)
 class UnreadDescriptions:
-    """The rest of a definition before 4.1, from the first description on whose type is unknown and so has no known end."""
+    """The rest of a definition before 4.1, from the first description on whose type, and so its end, is unknown."""
 
     count: int
     """How many descriptions it holds."""
@@ -184,7 +184,7 @@ class ModelDef:
         if self.unread is not None:
             kind = int.from_bytes(self.unread.octets[:4], "little", signed=True)
             notes.append(
-                f"The last {self.unread.count} descriptions ({len(self.unread.octets)} bytes) could not be read: the first "
-                f"of them is of unknown type {kind}."
+                f"The last {self.unread.count} descriptions ({len(self.unread.octets)} bytes) could not be read: "
+                f"the first of them is of unknown type {kind}."
             )
         return tuple(notes)

@@ -1,7 +1,7 @@
 """A cursor over one datagram that never reads past its end.
 
-Counts are bounded by the bytes left before anything is made for them, so no datagram costs more memory than its own size in
-order of magnitude. Every mistake in the bytes is a `ProtocolError`.
+Counts are bounded by the bytes left before anything is made for them, so no datagram costs more memory than its own
+size in order of magnitude. Every mistake in the bytes is a `ProtocolError`.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Cursor:
         return self.bounded(self.int32(), entry_octets, most)
 
     def bounded(self, count: int, entry_octets: int, most: int | None = None) -> int:
-        """Return `count` if so many entries of at least `entry_octets` bytes can follow, and are not more than `most`."""
+        """Return `count` if so many entries of at least `entry_octets` bytes can follow, at most `most`."""
         if not 0 <= count * entry_octets <= self.end - self.at:
             raise ProtocolError(
                 f"{count} entries of {entry_octets} bytes are announced at byte {self.at}; {self.left} bytes are left."

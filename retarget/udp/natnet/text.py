@@ -1,7 +1,8 @@
 """Text on the wire: UTF-8 in principle, any bytes in practice, and nothing may be lost on the way back.
 
-A byte that is not UTF-8 becomes one private character U+EF80 to U+EFFF, so that the text can be shown and written anywhere
-and still gives the very same bytes again. A sender's own use of these 128 characters is kept too: it counts as not UTF-8.
+A byte that is not UTF-8 becomes one private character U+EF80 to U+EFFF, so that the text can be shown and written
+anywhere and still gives the very same bytes again. A sender's own use of these 128 characters is kept too: it counts as
+not UTF-8.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Which bitstream a datagram is written in, and what each version put into it.
 
-A frame and a model definition carry no version of their own: the sender's answer to CONNECT says it once.
-Known are 2.5 to 4.3; the layouts follow the comments of the vendor's headers and its packet client, and where these disagree
-with captured datagrams (see `BitstreamLayout.timestamp`), the datagrams.
+A frame and a model definition carry no version of their own: the sender's answer to CONNECT says it once. Known are 2.5
+to 4.3; the layouts follow the comments of the vendor's headers and its packet client, and where these disagree with
+captured datagrams (see `BitstreamLayout.timestamp`), the datagrams.
 """
 
 from __future__ import annotations
