@@ -6,7 +6,7 @@ Frame ``head`` has the axes of ``rig`` and its origin at the rest position of th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -126,3 +126,5 @@ class Rig:
     eye_joints: tuple[int | None, int | None]
     """Left and right."""
     jaw: Jaw | None
+    licence: dict[str, str] = field(default_factory=dict)
+    """What rig.toml says of licence, source and authors."""
