@@ -47,7 +47,7 @@ def decode(datagram: bytes, version: Bitstream | None = None) -> Message:
             f"{len(datagram)} bytes are too few for a NatNet datagram, which starts with {HEADER.size}."
         )
     cursor = Cursor(bytes(datagram), HEADER.size)
-    kind = int.from_bytes(datagram[:2], "little")
+    kind, _ = HEADER.unpack_from(datagram)
     if kind == _FRAMEOFDATA:
         return read_frame(cursor, _layout(version))
     if kind == _MODELDEF:

@@ -7,12 +7,15 @@ with four zero bytes and nothing behind them, in all versions.
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
 from retarget.errors import ProtocolError
 from retarget.udp.natnet.framedata import (
+    NO_BODIES,
+    NO_MARKERS,
+    NO_POSITIONS,
     AnalogSamples,
     Asset,
     BodyMarkers,
@@ -46,64 +49,47 @@ MAX_CHANNELS = 1000
 """Limits of what costs an object each; blocks of markers are bounded by the bytes alone."""
 
 _END = 0
-_TAIL_OCTETS = 6
 _NAME_OCTETS = 1
 _COUNT_OCTETS = 4
 _BODY_HEAD_OCTETS = 32
 _BODY_MARKER_OCTETS = 20
 
-_SIZED = struct.Struct("<ii")
-_TIMECODE = struct.Struct("<II")
-_FLOAT32 = struct.Struct("<f")
-_FLOAT64 = struct.Struct("<d")
-_TICKS = struct.Struct("<QQQ")
-_PRECISION = struct.Struct("<II")
-_PARAMS = struct.Struct("<H")
+_SUFFIX = struct.Struct("<IIdQQQHi")
+_SUFFIX_PRECISE = struct.Struct("<IIdQQQIIHi")
+_EARLY_SUFFIXES = {
+    TimestampForm.ABSENT: struct.Struct("<fIIi"),
+    TimestampForm.FLOAT32: struct.Struct("<fIIfHi"),
+    TimestampForm.FLOAT64: struct.Struct("<fIIdHi"),
+}
+Suffix: TypeAlias = tuple[float | None, int, int, float | None, Ticks | None, PrecisionTime | None, int]
+"""The last seven fields of a `FrameOfData`."""
 
 
 def read_frame(cursor: Cursor, layout: BitstreamLayout) -> FrameOfData:
     """Read the payload of a FRAMEOFDATA to its end; raise `ProtocolError` where it does not follow `layout`."""
-    number = cursor.int32()
-    marker_sets = _section(cursor, layout, _marker_sets)
-    other_markers = _section(cursor, layout, _positions)
-    bodies = _section(cursor, layout, _bodies)
-    skeletons = _section(cursor, layout, _skeletons)
-    assets = _section(cursor, layout, _assets) if layout.assets else ()
-    labelled = _section(cursor, layout, _labelled)
-    force_plates = _section(cursor, layout, _analog) if layout.force_plates else ()
-    devices = _section(cursor, layout, _analog) if layout.devices else ()
-    latency = cursor.unpack(_FLOAT32)[0] if layout.software_latency else None
-    timecode, subframe = cursor.unpack(_TIMECODE)
-    timestamp_s = _timestamp(cursor, layout)
-    ticks = Ticks(*cursor.unpack(_TICKS)) if layout.ticks else None
-    precision = _precision(cursor, layout)
-    params = cursor.unpack(_PARAMS)[0] if layout.params else 0
-    _end_of_data(cursor)
     return FrameOfData(
-        number,
-        marker_sets,
-        other_markers,
-        bodies,
-        skeletons,
-        assets,
-        labelled,
-        force_plates,
-        devices,
-        latency,
-        timecode,
-        subframe,
-        timestamp_s,
-        ticks,
-        precision,
-        params,
+        cursor.int32(),
+        _section(cursor, layout, _marker_sets, ()),
+        _section(cursor, layout, _positions, NO_POSITIONS),
+        _section(cursor, layout, _bodies, NO_BODIES),
+        _section(cursor, layout, _skeletons, ()),
+        _section(cursor, layout, _assets, ()) if layout.assets else (),
+        _section(cursor, layout, _labelled, NO_MARKERS),
+        _section(cursor, layout, _analog, ()) if layout.force_plates else (),
+        _section(cursor, layout, _analog, ()) if layout.devices else (),
+        *(_suffix(cursor, layout) if layout.ticks else _early_suffix(cursor, layout)),
     )
 
 
-def _section(cursor: Cursor, layout: BitstreamLayout, entries: Callable[[Cursor, BitstreamLayout, int], T]) -> T:
+def _section(
+    cursor: Cursor, layout: BitstreamLayout, entries: Callable[[Cursor, BitstreamLayout, int], T], nothing: T
+) -> T:
     """Read the count of a section, its entries, and hold them against its size where the bitstream tells it."""
     if not layout.section_sizes:
         return entries(cursor, layout, cursor.int32())
-    count, octets = cursor.unpack(_SIZED)
+    count, octets = cursor.int32_pair()
+    if count == octets == 0:
+        return nothing
     start = cursor.at
     value = entries(cursor, layout, count)
     if cursor.at - start != octets:
@@ -174,25 +160,26 @@ def _channels(cursor: Cursor) -> tuple[NDArray[np.float32], ...]:
     return tuple([cursor.floats(cursor.int32()) for _ in range(count)])
 
 
-def _timestamp(cursor: Cursor, layout: BitstreamLayout) -> float | None:
-    if layout.timestamp is TimestampForm.ABSENT:
-        return None
-    form = _FLOAT64 if layout.timestamp is TimestampForm.FLOAT64 else _FLOAT32
-    seconds: float = cursor.unpack(form)[0]
-    return seconds
+def _suffix(cursor: Cursor, layout: BitstreamLayout) -> Suffix:
+    """Read all behind the last section, from 3.0; where sources disagree (4.0) the bytes left tell which form it is."""
+    with_precision = layout.precision is PrecisionForm.PRESENT or (
+        layout.precision is PrecisionForm.EITHER and cursor.left != _SUFFIX.size
+    )
+    values = cursor.last(_SUFFIX_PRECISE if with_precision else _SUFFIX)
+    timecode, subframe, timestamp_s, exposed, received, sent, *precision, params, end = values
+    _require_end(end)
+    precise = PrecisionTime(*precision) if with_precision else None
+    return None, timecode, subframe, timestamp_s, Ticks(exposed, received, sent), precise, params
 
 
-def _precision(cursor: Cursor, layout: BitstreamLayout) -> PrecisionTime | None:
-    """Read the precision time stamp; where sources disagree on it, the frame's fixed tail tells whether it is there."""
-    if layout.precision is PrecisionForm.ABSENT:
-        return None
-    if layout.precision is PrecisionForm.EITHER and cursor.left == _TAIL_OCTETS:
-        return None
-    return PrecisionTime(*cursor.unpack(_PRECISION))
+def _early_suffix(cursor: Cursor, layout: BitstreamLayout) -> Suffix:
+    """Read all behind the last section, before 3.0."""
+    latency, timecode, subframe, *stamped, end = cursor.last(_EARLY_SUFFIXES[layout.timestamp])
+    _require_end(end)
+    timestamp_s, params = stamped or (None, 0)
+    return latency, timecode, subframe, timestamp_s, None, None, params
 
 
-def _end_of_data(cursor: Cursor) -> None:
-    tag = cursor.int32()
+def _require_end(tag: int) -> None:
     if tag != _END:
-        raise ProtocolError(f"The frame ends with {tag} in place of 0.")
-    cursor.finish()
+        raise ProtocolError(f"The frame ends with {tag} in place of {_END}.")

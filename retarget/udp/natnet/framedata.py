@@ -9,7 +9,7 @@ datagrams.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -184,8 +184,7 @@ class AnalogSamples:
     channels: tuple[NDArray[np.float32], ...]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Ticks:
+class Ticks(NamedTuple):
     """The server's high-resolution clock; its frequency is in the SERVERINFO."""
 
     mid_exposure: int
@@ -196,8 +195,7 @@ class Ticks:
     """The frame left the server."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PrecisionTime:
+class PrecisionTime(NamedTuple):
     """Precision time stamp of the cameras' own clock (from 4.1; in some streams of 4.0)."""
 
     seconds: int
@@ -205,10 +203,10 @@ class PrecisionTime:
     """In parts of 2**32 of a second."""
 
 
-_NO_POSITIONS = np.empty((0, 3), "<f4")
-_NO_POSITIONS.flags.writeable = False
-_NO_MARKERS = LabelledMarkers(np.empty(0, MARKER))
-_NO_BODIES = RigidBodies(np.empty(0, BODY))
+NO_POSITIONS = np.empty((0, 3), "<f4")
+NO_POSITIONS.flags.writeable = False
+NO_MARKERS = LabelledMarkers(np.empty(0, MARKER))
+NO_BODIES = RigidBodies(np.empty(0, BODY))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,12 +215,12 @@ class FrameOfData:
 
     number: int
     marker_sets: tuple[MarkerSet, ...] = ()
-    other_markers: NDArray[np.float32] = field(default_factory=lambda: _NO_POSITIONS)
+    other_markers: NDArray[np.float32] = field(default_factory=lambda: NO_POSITIONS)
     """(n, 3) [m]: markers of no asset, the older way of telling (`labelled` has them too, as unlabelled, from 3.0)."""
-    bodies: RigidBodies = _NO_BODIES
+    bodies: RigidBodies = NO_BODIES
     skeletons: tuple[Skeleton, ...] = ()
     assets: tuple[Asset, ...] = ()
-    labelled: LabelledMarkers = _NO_MARKERS
+    labelled: LabelledMarkers = NO_MARKERS
     force_plates: tuple[AnalogSamples, ...] = ()
     devices: tuple[AnalogSamples, ...] = ()
     software_latency: float | None = None

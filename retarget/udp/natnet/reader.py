@@ -18,7 +18,9 @@ from retarget.udp.natnet.text import text_from_octets
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_INT32 = struct.Struct("<i")
+_INT32 = struct.Struct("<i").unpack_from
+_ndarray = np.ndarray
+_PAIR = struct.Struct("<ii").unpack_from
 
 
 class Cursor:
@@ -41,14 +43,37 @@ class Cursor:
         try:
             values = form.unpack_from(self.data, self.at)
         except struct.error:
-            raise ProtocolError(f"The datagram ends at byte {self.end}, in the middle of a number.") from None
+            raise self._cut_short() from None
         self.at += form.size
         return values
 
     def int32(self) -> int:
         """Read one signed number of 32 bits."""
-        value: int = self.unpack(_INT32)[0]
+        at = self.at
+        self.at = at + 4
+        try:
+            value: int = _INT32(self.data, at)[0]
+        except struct.error:
+            raise self._cut_short() from None
         return value
+
+    def int32_pair(self) -> tuple[int, int]:
+        """Read two signed numbers of 32 bits."""
+        at = self.at
+        self.at = at + 8
+        try:
+            first, second = _PAIR(self.data, at)
+        except struct.error:
+            raise self._cut_short() from None
+        return first, second
+
+    def last(self, form: struct.Struct) -> tuple[Any, ...]:
+        """Read the numbers of `form`, which must be all that is left."""
+        if self.end - self.at != form.size:
+            raise ProtocolError(
+                f"{self.left} bytes are left at byte {self.at}, where the last {form.size} are expected."
+            )
+        return self.unpack(form)
 
     def count(self, entry_octets: int, most: int | None = None) -> int:
         """Read how many entries follow, of at least `entry_octets` bytes each and at most `most`."""
@@ -77,7 +102,7 @@ class Cursor:
     def text(self) -> str:
         """Read text up to its closing NUL."""
         start = self.at
-        stop = self.data.find(b"\0", start, self.end)
+        stop = self.data.find(b"\0", start)
         if stop < 0:
             raise ProtocolError(f"The name at byte {start} has no end.")
         self.at = stop + 1
@@ -108,10 +133,12 @@ class Cursor:
         if self.at != self.end:
             raise ProtocolError(f"{self.left} bytes follow the end of the message at byte {self.at}.")
 
+    def _cut_short(self) -> ProtocolError:
+        return ProtocolError(f"The datagram ends at byte {self.end}, in the middle of a number.")
+
     def _view(self, shape: tuple[int, ...], kind: np.dtype[Any], octets: int) -> NDArray[Any]:
         start = self.at
-        stop = start + octets
+        self.at = stop = start + octets
         if not start <= stop <= self.end:
-            raise ProtocolError(f"{octets} bytes are announced at byte {start}; {self.left} are left.")
-        self.at = stop
-        return np.ndarray(shape, kind, self.data, start)
+            raise ProtocolError(f"{octets} bytes are announced at byte {start}; the datagram ends at byte {self.end}.")
+        return _ndarray(shape, kind, self.data, start)
