@@ -109,7 +109,7 @@ class _Identity:
 
 
 def head_size(rig: Rig) -> tuple[Array, float]:
-    """T_head_small and the scale that take places on the small rig's ``head`` to those of `rig`, by their common sites."""
+    """T_head_small and scale: places on the small rig's ``head`` to those of `rig`, by their common sites."""
     small = site_rests()
     common = [name for name in small if name in rig.sites]
     return geometry.umeyama(np.array([small[n] for n in common]), np.array([rig.sites[n].rest for n in common]))
@@ -119,7 +119,8 @@ def _rest(rig: Rig, name: str, site: str) -> Array:
     if site:
         return rig.sites[site].rest
     T_head_small, size = head_size(rig)
-    return geometry.apply(T_head_small, size * np.array([HEAD_BAND[name]]))[0]
+    place: Array = geometry.apply(T_head_small, size * np.array([HEAD_BAND[name]]))[0]
+    return place
 
 
 def _outwards(points: Array) -> Array:

@@ -74,7 +74,7 @@ EXPRESSIONS_MM: dict[str, dict[str, tuple[float, float, float]]] = {
         "cheekUpper": (0, -1.5, -0.5),
     },
 }
-"""Displacement [mm] at full strength of the site on the left; the right mirrors it, and the middle has no sideways part.
+"""Displacement [mm] at full strength of the site on the left; the right mirrors it, the middle has no sideways part.
 "open" is what soft tissue does beside the jaw's own turn when it is wide open."""
 
 
@@ -97,7 +97,8 @@ def smooth_noise(times: Array, rng: np.random.Generator, band_hz: tuple[float, f
     """(T,): a sum of sinusoids of random phase with frequencies in the band; the same curve at any frame rate."""
     frequencies, phases = rng.uniform(*band_hz, 12), rng.uniform(0, 2 * np.pi, 12)
     waves: Array = np.sin(2 * np.pi * times[:, None] * frequencies + phases)
-    return rms * np.sqrt(2 / 12) * waves.sum(axis=1)
+    noise: Array = rms * np.sqrt(2 / 12) * waves.sum(axis=1)
+    return noise
 
 
 def bump(times: Array, start: float, rise: float, hold: float, fall: float) -> Array:
@@ -126,7 +127,7 @@ def syllables(times: Array, rng: np.random.Generator, start: float, end: float) 
 
 
 def head_motion(times: Array, rng: np.random.Generator, strength: Array, turn_deg: Array | None = None) -> Array:
-    """T_world_head (T, 4, 4): the small motion of a head that is alive, times `strength` (T,), about a head in the room.
+    """T_world_head (T, 4, 4): the small motion of a head that is alive, times `strength` (T,), in the room.
 
     `turn_deg` (T, 3) adds turns about x (nod), y (shake) and z (tilt).
     """
