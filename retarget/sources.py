@@ -1,0 +1,217 @@
+"""Where marker frames come from, by the ending of a file name or the scheme of an address.
+
+Other packages add sources through the entry-point group ``retarget.sources``: the entry's name is the scheme or ending,
+its object a function from the text that the user gave to a `Source`.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import asdict
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol, Self
+
+from retarget.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
+
+    from retarget.frames import MarkerFrame
+    from retarget.markers.clip import MarkerClip
+    from retarget.udp.natnet.source import NatNetSource
+
+
+class Source(Protocol):
+    """Marker frames in the capture volume, under the names that the source has for them; a context manager."""
+
+    @property
+    def live(self) -> bool:
+        """True where frames come when they come, and are lost if nobody takes them."""
+
+    @property
+    def rate_hz(self) -> float | None:
+        """Frames a second, once the source is open; None if it does not tell."""
+
+    @property
+    def frame_count(self) -> int | None:
+        """How many frames there will be; None if nobody knows."""
+
+    def counts(self) -> dict[str, int]:
+        """What happened on the way so far, by name: frames lost, datagrams refused and the like."""
+
+    def stop(self) -> None:
+        """End the iteration soon; may be called from another thread or from a signal's function."""
+
+    def __enter__(self) -> Self:
+        """Open it; RetargetError where that fails."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        """The frames, as they come."""
+
+
+class ClipSource:
+    """A take in memory, frame by frame, as fast as they are taken."""
+
+    live = False
+
+    def __init__(self, clip: MarkerClip) -> None:
+        self._clip = clip
+        self._stopped = False
+        self._given = 0
+
+    @property
+    def rate_hz(self) -> float | None:
+        """The take's own rate [Hz]."""
+        return self._clip.rate_hz
+
+    @property
+    def frame_count(self) -> int | None:
+        """All frames of the take."""
+        return len(self._clip)
+
+    def counts(self) -> dict[str, int]:
+        """A file loses nothing."""
+        return {"received": self._given}
+
+    def stop(self) -> None:
+        """No frame after the current one."""
+        self._stopped = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        for frame in self._clip:
+            if self._stopped:
+                return
+            self._given += 1
+            yield frame
+
+
+class NatNetMarkers:
+    """A NatNet server; frames come when they come."""
+
+    live = True
+    frame_count = None
+
+    def __init__(self, source: NatNetSource) -> None:
+        self._source = source
+
+    @property
+    def rate_hz(self) -> float | None:
+        """As the server told [Hz]."""
+        return self._source.rate_hz
+
+    def counts(self) -> dict[str, int]:
+        """What became of the datagrams."""
+        return asdict(self._source.stats)
+
+    def stop(self) -> None:
+        """Leave the server."""
+        self._source.close()
+
+    def __enter__(self) -> Self:
+        self._source.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._source.close()
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        return iter(self._source)
+
+
+class Paced:
+    """A take in memory at its own speed, for somebody who watches."""
+
+    live = False
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._stopped = threading.Event()
+
+    @property
+    def rate_hz(self) -> float | None:
+        """That of the take [Hz]."""
+        return self._source.rate_hz
+
+    @property
+    def frame_count(self) -> int | None:
+        """That of the take."""
+        return self._source.frame_count
+
+    def counts(self) -> dict[str, int]:
+        """Those of the take."""
+        return self._source.counts()
+
+    def stop(self) -> None:
+        """No frame after the current one."""
+        self._stopped.set()
+        self._source.stop()
+
+    def __enter__(self) -> Self:
+        self._source.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._source.__exit__(kind, error, trace)
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        start_s = time.monotonic()
+        for frame in self._source:
+            if self._stopped.wait(max(0.0, start_s + frame.time_s - time.monotonic())):
+                return
+            yield frame
+
+
+def open_source(where: str) -> Source:
+    """The source for a file or an address, not yet opened; InputError where none takes it."""
+    name = where.split("://", 1)[0] if "://" in where else Path(where).suffix.lower()
+    known = {**SCHEMES, **ENDINGS}
+    if name in known:
+        return known[name](where)
+    for entry in entry_points(group="retarget.sources", name=name):
+        source: Source = entry.load()(where)
+        return source
+    if "://" not in where and not Path(where).exists():
+        raise InputError(f"There is no file {where}.")
+    raise InputError(f"Markers cannot be read from {where!r}; a source is one of {', '.join(known_sources())}.")
+
+
+def known_sources() -> list[str]:
+    """What a source can be, for people to read."""
+    others = sorted(entry.name for entry in entry_points(group="retarget.sources"))
+    return [*(f"{scheme}://HOST" for scheme in SCHEMES), *(f"*{ending}" for ending in ENDINGS), *others]
+
+
+def _c3d(where: str) -> Source:
+    from retarget.markers.c3d import read_c3d
+
+    return ClipSource(read_c3d(Path(where)))
+
+
+def _natnet(where: str) -> Source:
+    from retarget.udp.natnet.source import NatNetSource
+
+    return NatNetMarkers(NatNetSource(where))
+
+
+SCHEMES: dict[str, Callable[[str], Source]] = {"natnet": _natnet}
+ENDINGS: dict[str, Callable[[str], Source]] = {".c3d": _c3d}
