@@ -1,8 +1,8 @@
 """How the motions of several joints become the motion of one vertex: two ways with one form of call.
 
-Linear: p' = sum_i w_i M_i p (Magnenat-Thalmann 1988), what glTF asks for. It shrinks where joints turn against each other.
-Dual quaternions: the rigid motions themselves are blended, so the volume stays (Kavan, Collins, Zara, O'Sullivan, "Geometric skinning with
-approximate dual quaternion blending", ACM TOG 27(4), 2008), at about twice the cost.
+Linear: p' = sum_i w_i M_i p (Magnenat-Thalmann 1988), what glTF asks for. It shrinks where joints turn against each
+other. Dual quaternions: the rigid motions themselves are blended, so the volume stays, at twice the cost (Kavan et
+al., "Geometric skinning with approximate dual quaternion blending", ACM TOG 27(4), 2008).
 Motions are ``T_rig_mesh``: from the bind pose to ``rig``, which is the identity where a joint stands as it was bound.
 """
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Array32 = NDArray[np.float32]
+    Sparse = csr_array[np.float32, tuple[int, int]]
 
 
 class Blend(Protocol):
@@ -35,7 +36,7 @@ class Blend(Protocol):
 class LinearBlend:
     """Linear blend skinning; motions may hold scale."""
 
-    def __init__(self, weights: csr_array) -> None:
+    def __init__(self, weights: Sparse) -> None:
         """For `weights` (V, J) with rows that add up to 1."""
         self._weights = weights
 
@@ -51,10 +52,11 @@ class LinearBlend:
 class DualQuaternionBlend:
     """Dual quaternion linear blending; motions must be rigid.
 
-    q and -q are the same turn, so every motion is first brought to the hemisphere of the vertex's heaviest joint (Kavan 2008, section 4.1).
+    q and -q are the same turn, so every motion is first brought to the hemisphere of the vertex's heaviest joint
+    (Kavan 2008, section 4.1).
     """
 
-    def __init__(self, weights: csr_array) -> None:
+    def __init__(self, weights: Sparse) -> None:
         """For `weights` (V, J) with rows that add up to 1, none of them empty."""
         self._weights = weights.copy()
         self._rest_weights = weights.data.copy()
@@ -73,7 +75,7 @@ class DualQuaternionBlend:
         return _move(blended[:4], blended[4:], np.ascontiguousarray(positions.T))
 
 
-BLENDS: dict[str, Callable[[csr_array], Blend]] = {"linear": LinearBlend, "dual-quaternion": DualQuaternionBlend}
+BLENDS: dict[str, Callable[[Sparse], Blend]] = {"linear": LinearBlend, "dual-quaternion": DualQuaternionBlend}
 
 
 def _dual_quaternions(turns: Array, translations: Array) -> Array32:
@@ -87,8 +89,8 @@ def _dual_quaternions(turns: Array, translations: Array) -> Array32:
 def _move(real: Array32, dual: Array32, points: Array32) -> Array32:
     """(V, 3): points (3, V) moved by unit dual quaternions, parts (4, V) each (Algorithm 1).
 
-    p + 2 v x (v x p + w p) is the turn and 2 (w d - e v + v x d) the translation, for the real part (v, w) and the dual part (d, e); together
-    p + 2 (v x (v x p + w p + d) + w d - e v).
+    For the real part (v, w) and the dual part (d, e), p + 2 v x (v x p + w p) is the turn and 2 (w d - e v + v x d) the
+    translation; together p + 2 (v x (v x p + w p + d) + w d - e v).
     """
     v, w, d, e = real[:3], real[3], dual[:3], dual[3]
     inner = _cross(v, points)

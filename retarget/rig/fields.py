@@ -1,18 +1,20 @@
 """One object of a glTF document, read strictly: every value has the type asked for, or the error says where it stands.
 
-The document is foreign input, so a wrong type, a missing key or a number that is not finite ends in `InputError` with the place of the
-value, never in a `KeyError`.
+The document is foreign input, so a wrong type, a missing key or a number that is not finite ends in `InputError` with
+the place of the value, never in a `KeyError`.
 """
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 from retarget.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+LARGEST = 1e9
+"""Beyond this a length, a scale or a colour is damage, and products of several would overflow."""
 
 
 class Fields:
@@ -43,7 +45,7 @@ class Fields:
         return value
 
     def number(self, key: str, default: float | None = None) -> float:
-        """A finite number."""
+        """A number smaller than `LARGEST`."""
         value = self.data.get(key, default)
         if not _is_number(value):
             raise self.wrong(key, "a number")
@@ -64,7 +66,7 @@ class Fields:
         return value
 
     def numbers(self, key: str, count: int, default: Iterable[float] | None = None) -> list[float]:
-        """Exactly `count` finite numbers."""
+        """Exactly `count` numbers, each smaller than `LARGEST`."""
         value = self.data.get(key, default)
         if isinstance(value, list | tuple) and len(value) == count and all(map(_is_number, value)):
             return [float(v) for v in value]
@@ -97,4 +99,4 @@ class Fields:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < LARGEST

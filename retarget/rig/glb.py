@@ -1,7 +1,7 @@
 """The GLB container and its accessors: bytes to a glTF document and numpy arrays.
 
-A GLB is a 12-byte header, a JSON chunk and one binary chunk, all little-endian. Everything a count or an offset points at is checked against
-the bytes that are there, so that a broken file ends in `InputError` and never in memory it does not own or need.
+A GLB is a 12-byte header, a JSON chunk and one binary chunk, all little-endian. Everything a count or an offset points
+at is checked against the bytes that are there, so that a broken file ends in `InputError`.
 Reference: Khronos glTF 2.0 specification, sections 3.6 (buffers, accessors) and 4 (GLB).
 """
 
@@ -40,8 +40,11 @@ SHAPES = {
 COMPRESSION = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_mesh_quantization", "KHR_texture_basisu")
 """Required extensions that an exporter can be told to leave off."""
 
-LOOKS = ("KHR_materials_", "KHR_lights_")
-"""Beginnings of required extensions that change shading only, so that the rig still moves as it should without them."""
+HARMLESS = ("KHR_materials_", "KHR_lights_", "VRM")
+"""Beginnings of required extensions without which the mesh still is where it should be."""
+
+DAMAGED = "the file is damaged, export it again"
+"""End of messages about what no exporter writes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,19 +70,20 @@ class Glb:
         buffer = view.integer("buffer")
         if buffer != 0 or "uri" in self.entry("buffers", 0):
             raise InputError(
-                f"{self.path.name} keeps data outside its binary chunk ({view.place}); export it as one GLB with everything inside."
+                f"{self.path.name} keeps data outside its binary chunk; export it as one GLB with everything inside."
             )
         start, length = view.integer("byteOffset", 0), view.integer("byteLength")
         if start + length > len(self.binary):
             raise InputError(
-                f"{view.place} ends at byte {start + length} of a binary chunk of {len(self.binary)}; the file is damaged, export it again."
+                f"{view.place} ends at byte {start + length} of the {len(self.binary)} there are; {DAMAGED}."
             )
         return memoryview(self.binary)[start : start + length], view.integer("byteStride", 0)
 
     def array(self, index: int) -> NDArray[Any]:
         """An accessor's values: (N,) for SCALAR, (N, n) for VECn, (N, n, n) with rows first for MATn.
 
-        Integers marked normalised become float32 in [0, 1] or [-1, 1] (section 3.6.2.2); others keep their type. Sparse values are filled in.
+        Integers marked normalised become float32 in [0, 1] or [-1, 1] (section 3.6.2.2); others keep their type. Sparse
+        values are filled in.
         """
         accessor = self.entry("accessors", index)
         count = accessor.integer("count")
@@ -107,7 +111,7 @@ class Glb:
         end = start + (count - 1) * stride + used if count else start
         if stride < used or end > len(data):
             raise InputError(
-                f"{fields.place} asks for {count} elements up to byte {end} of a buffer view of {len(data)}; the file is damaged, export it again."
+                f"{fields.place} asks for {count} elements up to byte {end} of the {len(data)} there are; {DAMAGED}."
             )
         strides = (stride, column, dtype.itemsize)
         return (
@@ -119,9 +123,7 @@ class Glb:
         at_fields = sparse.table("indices")
         at = self._strided(at_fields, _dtype(at_fields), (1, 1), count)[:, 0, 0]
         if at.dtype.kind != "u" or (count and int(at.max()) >= len(values)):
-            raise InputError(
-                f"{sparse.place} replaces an element beyond the {len(values)} there are; the file is damaged, export it again."
-            )
+            raise InputError(f"{sparse.place} replaces an element beyond the {len(values)} there are; {DAMAGED}.")
         filled = values.copy()
         filled[at] = self._strided(sparse.table("values"), values.dtype, (values.shape[1], values.shape[2]), count)
         return filled
@@ -152,7 +154,7 @@ def _check_header(path: Path, data: bytes) -> None:
         )
     if len(data) < 12:
         raise InputError(
-            f"{str(path)!r} is cut short: a GLB header takes 12 bytes and {len(data)} are there; copy or export it again."
+            f"{str(path)!r} is cut short: 12 bytes are expected and {len(data)} are there; copy or export it again."
         )
     version, length = struct.unpack_from("<II", data, 4)
     if version != 2:
@@ -161,7 +163,7 @@ def _check_header(path: Path, data: bytes) -> None:
         )
     if length > len(data):
         raise InputError(
-            f"{str(path)!r} is cut short: {length} bytes are expected and {len(data)} are there; copy or export it again."
+            f"{str(path)!r} is cut short: {length} bytes are expected, {len(data)} are there; copy or export it again."
         )
 
 
@@ -173,9 +175,7 @@ def _chunks(path: Path, data: bytes) -> dict[int, bytes]:
     while at + 8 <= end:
         length, kind = struct.unpack_from("<II", data, at)
         if at + 8 + length > end:
-            raise InputError(
-                f"{path.name} is damaged: a chunk of {length} bytes is expected at byte {at} and {end - at - 8} are there; export it again."
-            )
+            raise InputError(f"{path.name}: a chunk announces {length} bytes and {end - at - 8} are there; {DAMAGED}.")
         chunks.setdefault(kind, data[at + 8 : at + 8 + length])
         at += 8 + length
     return chunks
@@ -185,11 +185,11 @@ def _check_extensions(document: Fields) -> None:
     for name in document.texts("extensionsRequired"):
         if name in COMPRESSION:
             raise InputError(
-                f"{document.place} is compressed with {name}, which cannot be read; export it again without compression."
+                f"{document.place} is compressed by {name}, which cannot be read; export it again uncompressed."
             )
-        if not name.startswith(LOOKS):
+        if not name.startswith(HARMLESS):
             raise InputError(
-                f"{document.place} requires the glTF extension {name}, which cannot be read; export it again without it."
+                f"{document.place} requires the extension {name}, which cannot be read; export it again without it."
             )
 
 
@@ -211,4 +211,4 @@ def _normalised(values: NDArray[Any]) -> NDArray[Any]:
     if values.dtype.kind not in "iu":
         return values
     scaled = values.astype(np.float32) / np.float32(np.iinfo(values.dtype).max)
-    return np.maximum(scaled, np.float32(-1.0))  # the lowest signed value has no positive twin
+    return scaled.clip(-1.0, 1.0)  # the lowest signed value has no positive twin

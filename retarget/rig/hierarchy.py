@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def joint_matrices(joints: Joints, translations: Array, rotations: Array) -> Array:
-    """T_rig_joint (J, 4, 4) of a pose given relative to the parents: translations (J, 3) [m], unit quaternions (J, 4) xyzw.
+    """T_rig_joint (J, 4, 4) of a pose relative to the parents: translations (J, 3) [m], unit quaternions (J, 4) xyzw.
 
     With the rest values of `joints` it gives their `T_rig_joint`. NaN of a joint reaches all that hang below it.
     """

@@ -122,7 +122,7 @@ def _beside(mesh: Path) -> Path:
     if path.is_file() and read_table(path, "rig file").string("mesh") == mesh.name:
         return path
     raise InputError(
-        f"{mesh} can be read, but a {RIG_FILE} beside it must say which of its joints are the head, the jaw and the sites of markers."
+        f"{mesh} can be read, but a {RIG_FILE} beside it must say which of its joints are head, jaw and sites."
     )
 
 
@@ -164,7 +164,7 @@ def _named_joints(root: Table) -> dict[str, tuple[Table, str]]:
 
 
 def _read_mesh(path: Path, named: Collection[str]) -> tuple[Joints, tuple[Surface, ...], tuple[str, ...]]:
-    """Joints, surfaces and names of the blend shapes of a GLB; `named` nodes are joints even where no skin uses them."""
+    """Joints, surfaces and names of the blend shapes of a GLB; `named` nodes are joints even without a skin."""
     glb = read_glb(path)
     nodes = read_nodes(glb)
     skeleton = read_skeleton(glb, nodes, named)

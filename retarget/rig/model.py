@@ -1,7 +1,7 @@
 """What a rig is, once it is loaded: joints, skin, blend shapes, sites and the jaw.
 
-Frame ``rig`` is that of the mesh file (glTF: right-handed, +Y up, +Z out of the face, +X to the character's left, metres).
-Frame ``head`` has the axes of ``rig`` and its origin at the rest position of the head joint.
+Frame ``rig`` is that of the mesh file (glTF: right-handed, +Y up, +Z out of the face, +X to the character's left, in
+metres). Frame ``head`` has the axes of ``rig`` and its origin at the rest position of the head joint.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ class Jaw:
 
     joint: int
     axis: NDArray[np.float64]
-    """(3,) unit, ``head``: a positive turn about it (right-hand rule) opens the mouth, so it points to the character's left."""
+    """(3,) unit, ``head``: a positive turn (right-hand rule) opens the mouth, so it points to the character's left."""
     pivot: NDArray[np.float64]
     """(3,) [m], ``head``."""
     min_rad: float

@@ -1,8 +1,9 @@
 """The node hierarchy of a glTF scene, and the rig's joints in it.
 
-Joints are the nodes that a skin lists and those that `rig.toml` names. Other nodes between or above them never move, so they are folded into the
-rest transform of the joint below. Joints move rigidly: scale in the hierarchy is folded into the bind matrices, where it is exact as long as
-it does not change, and translations of joints are metres of ``rig`` whatever the scale above them.
+Joints are the nodes that a skin lists and those that `rig.toml` names. Other nodes between or above them never move, so
+they are folded into the rest transform of the joint below. Joints move rigidly: scale in the hierarchy is folded into
+the bind matrices, and translations of joints are metres of ``rig`` whatever the scale above them. So uniform scale is
+exact; scale that differs between axes above a joint that turns stays in the joint's own axes, without glTF's shear.
 Reference: glTF 2.0, sections 3.5.3 (transformations) and 3.7.3 (skins).
 """
 
@@ -15,6 +16,8 @@ import numpy as np
 
 from retarget.errors import InputError
 from retarget.geometry import inverse, matrix_from_quat, quat_from_matrix, transform
+from retarget.rig.fields import LARGEST
+from retarget.rig.glb import DAMAGED
 from retarget.rig.model import Joints
 
 if TYPE_CHECKING:
@@ -47,8 +50,8 @@ class Nodes:
 class Skeleton:
     """The joints of a rig while it is read; grows where one joint is bound in two ways.
 
-    A rig's joint has one bind matrix. Where a second skin binds the same joint differently, a twin of the joint that rides on it at rest takes
-    the second matrix, so that no surface moves other than glTF says.
+    A rig's joint has one bind matrix. Where a second skin binds the same joint differently, a twin that rides on the
+    joint takes the second matrix, so that every surface moves as glTF says.
     """
 
     def __init__(self, nodes: Nodes, joint_nodes: Collection[int]) -> None:
@@ -111,13 +114,15 @@ def read_nodes(glb: Glb) -> Nodes:
         for child in below:
             glb.entry("nodes", child)
             if parents[child] >= 0:
-                raise InputError(f"{items[child].place} has two parents; the file is damaged, export it again.")
+                raise InputError(f"{items[child].place} has two parents; {DAMAGED}.")
             parents[child] = parent
     order = _parents_first(glb, parents, children)
     T_rig_node = np.tile(np.eye(4), (len(items), 1, 1))
     for n in order:
         local = _local_transform(items[n])
         T_rig_node[n] = local if parents[n] < 0 else T_rig_node[parents[n]] @ local
+        if np.abs(T_rig_node[n]).max() > LARGEST:
+            raise InputError(f"{items[n].place} is placed or scaled beyond all measure; {DAMAGED}.")
     names = tuple(item.text("name", "") or f"node{n}" for n, item in enumerate(items))
     return Nodes(names, tuple(parents), tuple(order), T_rig_node)
 
@@ -127,15 +132,14 @@ def read_skeleton(glb: Glb, nodes: Nodes, named: Collection[str]) -> Skeleton:
     listed = {n for skin in glb.document.tables("skins") for n in skin.integers("joints")}
     inside = set(nodes.order)
     for n in listed - inside:
-        raise InputError(
-            f"{glb.path.name}: a skin uses nodes[{n}], which is not in the scene; export the armature with the mesh."
-        )
-    chosen = listed | {n for n in inside if nodes.names[n] in named}
+        raise InputError(f"{glb.path.name}: a skin uses nodes[{n}], which is not in the scene; export them together.")
+    wanted = set(named) - {nodes.names[n] for n in listed}  # a mesh is often named as the joint that it hangs on
+    chosen = listed | {n for n in inside if nodes.names[n] in wanted}
     seen: set[str] = set()
     for n in chosen:
         if nodes.names[n] in seen:
             raise InputError(
-                f"{glb.path.name}: two joints are named {nodes.names[n]!r}; joints are found by name, so rename one and export again."
+                f"{glb.path.name} has two joints named {nodes.names[n]!r}; rename one and export it again."
             )
         seen.add(nodes.names[n])
     return Skeleton(nodes, chosen)
@@ -150,11 +154,9 @@ def _parents_first(glb: Glb, parents: list[int], children: list[list[int]]) -> l
     for n in order:
         glb.entry("nodes", n)
         if parents[n] >= 0:
-            raise InputError(
-                f"{glb.path.name}: the root nodes[{n}] of the scene has a parent; the file is damaged, export it again."
-            )
+            raise InputError(f"{glb.path.name}: the root nodes[{n}] of the scene has a parent; {DAMAGED}.")
     if len(set(order)) < len(order):
-        raise InputError(f"{glb.path.name}: a scene lists a root node twice; the file is damaged, export it again.")
+        raise InputError(f"{glb.path.name}: a scene lists a root node twice; {DAMAGED}.")
     for n in order:  # grows while it is read; ends, since no node has two parents and roots have none
         order.extend(children[n])
     return order
@@ -163,7 +165,9 @@ def _parents_first(glb: Glb, parents: list[int], children: list[list[int]]) -> l
 def _local_transform(node: Fields) -> Array:
     """T_parent_node (4, 4); may hold scale."""
     if "matrix" in node:
-        return np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+        T = np.array(node.numbers("matrix", 16)).reshape(4, 4).T
+        T[3] = (0.0, 0.0, 0.0, 1.0)
+        return T
     rotation = np.array(node.numbers("rotation", 4, (0.0, 0.0, 0.0, 1.0)))
     length = np.linalg.norm(rotation)
     if length < 1e-6:
@@ -173,7 +177,7 @@ def _local_transform(node: Fields) -> Array:
 
 
 def _nearest_rigid(T: Array) -> Array:
-    """The rigid transform with the same origin whose rotation is nearest to that of `T` (polar decomposition, Higham 1986)."""
+    """The rigid transform of the same origin whose rotation is nearest to `T` (polar decomposition, Higham 1986)."""
     U, _, Vt = np.linalg.svd(T[:3, :3])
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(U) * np.linalg.det(Vt))])
     return transform((U * sign) @ Vt, T[:3, 3])

@@ -1,8 +1,9 @@
 """Unit normals of a surface that moves: the area-weighted mean of the triangles around each vertex.
 
-Exporters split a vertex wherever its texture coordinates differ, and normals of the halves would drift apart as a visible seam; so vertices that
-belong together are welded for this purpose, by `weld`. The cross product of two edges is twice the triangle's area times its normal, which
-weights the mean by area at no cost. Reference: Max, "Weights for computing vertex normals from facet normals", J. Graphics Tools 4(2), 1999.
+Exporters split a vertex wherever its texture coordinates differ, and the normals of the halves would drift apart as a
+visible seam; so vertices that belong together are welded for this purpose, by `weld`. The cross product of two edges is
+twice the triangle's area times its normal, which weights the mean by area at no cost. Reference: Gouraud 1971; Max,
+"Weights for computing vertex normals from facet normals", J. Graphics Tools 4(2), 1999, compares the weights.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
     Array = NDArray[Any]
+    Sparse = csr_array[np.float32, tuple[int, int]]
 
 CREASE_CHORD = 0.5
 """Distance of two unit normals, about 29 degrees, beyond which a split vertex is an edge that is meant to be seen."""
@@ -31,7 +33,7 @@ class SmoothNormals:
     def __init__(self, triangles: NDArray[np.int32], groups: NDArray[np.intp], rest: NDArray[np.float32]) -> None:
         """For `triangles` (F, 3) over V vertices, of which those with equal `groups` (V,) share their normal.
 
-        `rest` (V, 3) are the normals of vertices around which there is no area: unused ones, or where all triangles are collapsed.
+        `rest` (V, 3) are the normals of vertices around which there is no area: unused, or all triangles collapsed.
         """
         self._corners = np.ascontiguousarray(triangles.T)  # (3, F)
         self._around = _incidence(triangles, groups)
@@ -50,16 +52,20 @@ class SmoothNormals:
 
 
 def vertex_normals(positions: Array, triangles: NDArray[np.int32]) -> NDArray[np.float32]:
-    """(V, 3) unit normals of positions (V, 3) and triangles (F, 3), smooth across vertices at the same place; +Z where there is no area."""
+    """(V, 3) unit normals of positions (V, 3) and triangles (F, 3), smooth across vertices at one place.
+
+    A vertex around which there is no area gets +Z.
+    """
     groups = weld(positions)
-    return SmoothNormals(triangles, groups, np.tile(np.float32([0, 0, 1]), (len(positions), 1)))(positions)
+    return SmoothNormals(triangles, groups, np.tile(np.array([0, 0, 1], np.float32), (len(positions), 1)))(positions)
 
 
-def weld(positions: Array, normals: Array | None = None, motion: csr_array | None = None) -> NDArray[np.intp]:
+def weld(positions: Array, normals: Array | None = None, motion: Sparse | None = None) -> NDArray[np.intp]:
     """(V,) for every vertex the number of the first one that it belongs to.
 
-    Two vertices belong together where they stand at exactly the same place of positions (V, 3), their `normals` (V, 3) agree (a hard edge stays
-    hard) and the rows of `motion` (V, K), what moves them, agree (lips that touch at rest stay two lips). Without them the place alone counts.
+    Two vertices belong together where they stand at exactly the same place of positions (V, 3), their `normals` (V, 3)
+    agree (a hard edge stays hard) and the rows of `motion` (V, K), what moves them, agree (lips that touch at rest stay
+    two lips). Without these the place alone counts.
     """
     _, place = np.unique(np.ascontiguousarray(positions), axis=0, return_inverse=True)
     groups = np.arange(len(positions))
@@ -76,15 +82,14 @@ def weld(positions: Array, normals: Array | None = None, motion: csr_array | Non
     return groups
 
 
-def _agree(
-    a: NDArray[np.intp], b: NDArray[np.intp], normals: Array | None, motion: csr_array | None
-) -> NDArray[np.bool_]:
+def _agree(a: NDArray[np.intp], b: NDArray[np.intp], normals: Array | None, motion: Sparse | None) -> NDArray[np.bool_]:
     same = np.ones(len(a), np.bool_)
     if normals is not None:
         same &= np.linalg.norm(normals[a] - normals[b], axis=1) < CREASE_CHORD
     if motion is not None:
         same &= abs(motion[a] - motion[b]).max(axis=1).toarray().ravel() < SAME_MOTION
-    return same | (a == b)
+    same[a == b] = True
+    return same
 
 
 def _doubled_areas(axes: Array, corners: NDArray[np.int32]) -> Array:
@@ -99,7 +104,7 @@ def _doubled_areas(axes: Array, corners: NDArray[np.int32]) -> Array:
     return out
 
 
-def _incidence(triangles: NDArray[np.int32], groups: NDArray[np.intp]) -> csr_array:
+def _incidence(triangles: NDArray[np.int32], groups: NDArray[np.intp]) -> Sparse:
     """(V, F): 1 where the triangle touches the vertex or one of its group."""
     from scipy.sparse import csr_array
 

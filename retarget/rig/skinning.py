@@ -1,7 +1,7 @@
 """From a pose to vertices: blend shapes, then skinning, then normals. All surfaces of the rig in one pass.
 
-Vertices come out in ``rig``: the pose moves the joints below their place there, and its `T_world_head` is left to the display.
-Blend shapes are added in the bind pose, before skinning, as in glTF 2.0, section 3.7.2.2; how joints share a vertex is told in `blending`.
+Vertices come out in ``rig``; the pose's `T_world_head` is left to the display. Blend shapes are added in the bind pose,
+before skinning, as in glTF 2.0, section 3.7.2.2; how joints share a vertex is told in `blending`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Array32 = NDArray[np.float32]
+    Sparse = csr_array[np.float32, tuple[int, int]]
 
 SkinningMethod = Literal["linear", "dual-quaternion"]
 
@@ -46,14 +47,14 @@ class Skin:
     """Deforms the surfaces of one rig; make it once and call it for every pose. Keeps no history."""
 
     def __init__(self, rig: Rig, method: SkinningMethod = "linear") -> None:
-        """For `rig`; InputError for a `method` that is not there, or dual quaternions where a bind matrix is not rigid."""
+        """For `rig`; InputError for an unknown `method`, or dual quaternions where a bind matrix is not rigid."""
         if method not in BLENDS:
             raise InputError(f"There is no skinning method {method!r}; there are: {', '.join(BLENDS)}.")
         self._rig = rig
         self._starts = np.cumsum([0, *(len(s.positions) for s in rig.surfaces)])
         self._bind = np.concatenate([s.positions for s in rig.surfaces])
-        weights = _weight_matrix(rig)
-        self._used = np.unique(weights.indices)
+        weights = _weight_matrix(rig, self._starts)
+        self._used = np.unique(weights.indices).astype(np.intp)
         if method == "dual-quaternion":
             _require_rigid(rig, self._used)
         self._blend = BLENDS[method](weights[:, self._used])
@@ -61,12 +62,12 @@ class Skin:
         self._normals = _smooth_normals(rig, self._starts, self._bind, weights, self._shapes)
 
     def __call__(self, pose: Pose) -> Deformed:
-        """The surfaces in `pose`, without its `T_world_head`; ValueError where the pose holds NaN or does not fit the rig."""
+        """The surfaces in `pose`, without its `T_world_head`; ValueError where it holds NaN or does not fit the rig."""
         positions = self.positions(pose)
         return Deformed(self._split(positions), self._split(self._normals(positions)))
 
     def positions(self, pose: Pose) -> Array32:
-        """(V, 3) [m], ``rig``: the vertices of all surfaces one after the other, without normals; raises as a call does."""
+        """(V, 3) [m], ``rig``: the vertices of all surfaces one after the other; raises as a call does."""
         _check(self._rig, pose)
         T_rig_joint = joint_matrices(self._rig.joints, pose.translations, pose.rotations)
         T_rig_mesh = T_rig_joint[self._used] @ self._rig.joints.T_joint_mesh[self._used]
@@ -88,18 +89,18 @@ def _check(rig: Rig, pose: Pose) -> None:
     J, B = len(rig.joints.names), len(rig.shape_names)
     if pose.translations.shape != (J, 3) or pose.rotations.shape != (J, 4) or pose.weights.shape != (B,):
         raise ValueError(
-            f"The pose holds {len(pose.translations)} translations, {len(pose.rotations)} rotations and {len(pose.weights)} weights; "
-            f"the rig {rig.name!r} has {J} joints and {B} blend shapes."
+            f"The rig {rig.name!r} has {J} joints and {B} blend shapes; the pose holds translations "
+            f"{pose.translations.shape}, rotations {pose.rotations.shape} and weights {pose.weights.shape}."
         )
     finite = np.isfinite(pose.translations).all(axis=1) & np.isfinite(pose.rotations).all(axis=1)
     if not finite.all():
         raise ValueError(
-            f"The pose of the joint {rig.joints.names[int(np.argmin(finite))]!r} is not finite; fill gaps before skinning."
+            f"The pose of joint {rig.joints.names[int(np.argmin(finite))]!r} is not finite; fill gaps before skinning."
         )
     finite = np.isfinite(pose.weights)
     if not finite.all():
         raise ValueError(
-            f"The weight of the shape {rig.shape_names[int(np.argmin(finite))]!r} is not finite; fill gaps before skinning."
+            f"The weight of {rig.shape_names[int(np.argmin(finite))]!r} is not finite; fill gaps before skinning."
         )
 
 
@@ -108,53 +109,49 @@ def _require_rigid(rig: Rig, used: NDArray[np.intp]) -> None:
     error = np.abs(np.swapaxes(R, 1, 2) @ R - np.eye(3)).max(axis=(1, 2))
     if error.max() > RIGID:
         name = rig.joints.names[used[int(np.argmax(error))]]
-        raise InputError(
-            f"The rig {rig.name!r} binds the joint {name!r} with scale, which dual quaternions cannot hold; use linear skinning."
-        )
+        raise InputError(f"The rig {rig.name!r} binds the joint {name!r} with scale, which needs linear skinning.")
 
 
-def _weight_matrix(rig: Rig) -> csr_array:
+def _weight_matrix(rig: Rig, starts: NDArray[np.intp]) -> Sparse:
     """(V, J) joint weights of all surfaces, one after the other; a joint of weight 0 takes no place."""
-    from scipy.sparse import csr_array, vstack
-
-    def of(joints: NDArray[np.intp], weights: Array32) -> csr_array:
-        rows = np.repeat(np.arange(len(joints)), joints.shape[1])
-        matrix = csr_array(
-            (weights.ravel(), (rows, joints.ravel())), shape=(len(joints), len(rig.joints.names)), dtype=np.float32
-        )
-        matrix.eliminate_zeros()
-        return matrix
-
-    return csr_array(vstack([of(s.joints, s.joint_weights) for s in rig.surfaces], format="csr"))
+    rows, columns, values = [], [], []
+    for surface, start in zip(rig.surfaces, starts, strict=False):
+        vertices, slots = np.nonzero(surface.joint_weights)
+        rows.append(vertices + start)
+        columns.append(surface.joints[vertices, slots])
+        values.append(surface.joint_weights[vertices, slots])
+    return _sparse(values, rows, columns, (int(starts[-1]), len(rig.joints.names)))
 
 
-def _shape_matrix(rig: Rig, starts: NDArray[np.intp]) -> csr_array:
+def _shape_matrix(rig: Rig, starts: NDArray[np.intp]) -> Sparse:
     """(3 V, B): column b holds x, y, z of every vertex's offset at weight 1 of shape b."""
-    from scipy.sparse import csr_array
+    rows, columns, values = [], [], []
+    for surface, start in zip(rig.surfaces, starts, strict=False):
+        for b, shape in enumerate(surface.shapes):
+            rows.append((3 * (shape.vertices[:, None] + start) + np.arange(3)).ravel())
+            columns.append(np.full(shape.offsets.size, b))
+            values.append(shape.offsets.ravel())
+    return _sparse(values, rows, columns, (3 * int(starts[-1]), len(rig.shape_names)))
 
-    moved = [
-        (b, start + s.shapes[b].vertices, s.shapes[b].offsets)
-        for s, start in zip(rig.surfaces, starts, strict=False)
-        for b in range(len(rig.shape_names))
-    ]
-    rows = [(3 * vertices[:, None] + np.arange(3)).ravel() for _, vertices, _ in moved]
-    columns = [np.full(3 * len(vertices), b) for b, vertices, _ in moved]
-    values = [offsets.ravel() for _, _, offsets in moved]
+
+def _sparse(
+    values: list[Array32], rows: list[NDArray[np.intp]], columns: list[NDArray[np.intp]], shape: tuple[int, int]
+) -> Sparse:
+    """The matrix of `shape` with the values at these places; values at one place add up."""
+    from scipy.sparse import coo_array
+
     nothing = np.zeros(0, np.intp)
-    return csr_array(
-        (np.concatenate([*values, nothing]), (np.concatenate([*rows, nothing]), np.concatenate([*columns, nothing]))),
-        shape=(3 * int(starts[-1]), len(rig.shape_names)),
-        dtype=np.float32,
-    )
+    places = np.concatenate([*rows, nothing]), np.concatenate([*columns, nothing])
+    return coo_array((np.concatenate([*values, nothing.astype(np.float32)]), places), shape).tocsr()
 
 
 def _smooth_normals(
-    rig: Rig, starts: NDArray[np.intp], bind: Array32, weights: csr_array, shapes: csr_array
+    rig: Rig, starts: NDArray[np.intp], bind: Array32, weights: Sparse, shapes: Sparse
 ) -> SmoothNormals:
-    from scipy.sparse import csr_array, hstack
+    from scipy.sparse import hstack
 
     normals = np.concatenate([s.normals for s in rig.surfaces])
     triangles = np.concatenate([s.triangles + start for s, start in zip(rig.surfaces, starts, strict=False)])
     offsets = shapes.reshape((len(bind), 3 * len(rig.shape_names)))
-    motion = csr_array(hstack([weights, offsets], format="csr"))
+    motion = hstack([weights, offsets], format="csr")
     return SmoothNormals(triangles.astype(np.int32), weld(bind, normals, motion), normals)
