@@ -4,7 +4,8 @@
 form is theta = atan2(n . (u' x v'), u' . v'), u' and v' seen along the hinge n: opening is positive, and a chin that
 slides sideways does not read as opening. For several markers the sums of both arguments give the turn that fits them
 all in the least squares sense. The cosine law, cos theta = (a^2 + b^2 - c^2) / (2 a b) with a = |u|, b = |v|,
-c = |v - u|, is the mode of the published joint mapping: it has no sign and takes any way of the chin for opening.
+c = |v - u|, is the mode of the published joint mapping: it has no sign and takes any way of the chin for opening. It is
+a law for one point in the middle of the face, so several markers count as their centre.
 """
 
 from __future__ import annotations
@@ -69,9 +70,10 @@ class JawReader:
         """The turn [rad] from the markers now, (N, 3) [m], ``head``; NaN where no marker that is seen has a lever."""
         levers = positions - self.pivot
         if self.mode == "cosine":
-            angles = cosine_angle(self.levers, levers)
-            seen = np.isfinite(angles)
-            return float(angles[seen].mean()) if seen.any() else math.nan
+            seen = np.isfinite(levers.sum(axis=1))
+            if not seen.any():
+                return math.nan
+            return float(cosine_angle(self.levers[seen].mean(axis=0), levers[seen].mean(axis=0)))
         if math.isnan(levers.sum()):
             levers = np.where(np.isnan(levers).any(axis=1, keepdims=True), 0.0, levers)
         sine, cosine = float(np.vdot(self.sine, levers)), float(np.vdot(self.cosine, levers))
