@@ -62,19 +62,21 @@ def camera_for(rig: Rig, view: View) -> Camera:
 def subject(rig: Rig, view: View) -> Array:
     """The points (N, 3) [m], ``rig``, that the picture must hold, from the rig at rest."""
     if view.framing == "face" and rig.sites:
-        return np.stack([site.rest for site in rig.sites.values()]) + rig.joints.T_rig_joint[rig.head_joint, :3, 3]
+        sites: Array = np.stack([site.rest for site in rig.sites.values()])
+        return sites + rig.joints.T_rig_joint[rig.head_joint, :3, 3]
     points, on_head = _all_points(rig), _on_head(rig)
     if not on_head.any():
         return points
-    head = points[on_head]
+    head: Array = points[on_head]
     if view.framing == "bust":
         lower, upper = head[:, 1].min(), head[:, 1].max()
-        return points[points[:, 1] > lower - BUST * (upper - lower)]
+        head = points[points[:, 1] > lower - BUST * (upper - lower)]
     return head
 
 
 def _all_points(rig: Rig) -> Array:
-    return np.concatenate([surface.positions for surface in rig.surfaces], dtype=float)
+    points: Array = np.concatenate([surface.positions for surface in rig.surfaces], dtype=float)
+    return points
 
 
 def _on_head(rig: Rig) -> NDArray[np.bool_]:

@@ -53,8 +53,8 @@ class Window:
         self._rig = rig
         self._controls = Controls(view or View())
         self._lock = threading.Lock()
-        self._pose = rest_pose(rig)
-        self._painter = Painter(rig, self._controls.view, self._pose, skin)
+        self._newest = self._followed = rest_pose(rig)
+        self._painter = Painter(rig, self._controls.view, self._newest, skin)
         self._pictures = pictures or Path()
         self._glass: Glass | None = None
         self._painted: Painted | None = None
@@ -85,7 +85,7 @@ class Window:
     def __call__(self, pose: Pose) -> None:
         """Show this pose as soon as may be; returns at once."""
         with self._lock:
-            self._pose = pose
+            self._newest = pose
             self._follow()
 
     def close(self) -> None:
@@ -114,8 +114,9 @@ class Window:
 
     def _follow(self) -> None:
         """Have the newest pose drawn, as the user wants to see it; a frozen face stays, but he may walk round it."""
-        held = self._painted if self._controls.frozen else None
-        self._painter.want(held.pose if held else self._pose, self._controls.view)
+        if not self._controls.frozen:
+            self._followed = self._newest
+        self._painter.want(self._followed, self._controls.view)
 
     def _save(self, painted: Painted) -> None:
         self._controls.picture_asked = False
