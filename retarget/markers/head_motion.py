@@ -37,26 +37,33 @@ class HeadMotion:
         elif step > 0:
             share = 1 - math.exp(-step / SMOOTH_S)
             self._turning = _blend(self._turning, small_turn(self.quat, quat), step, share)
-            x, y, z = (new - old for new, old in zip(position, self.position, strict=True))
-            self._moving = _blend(self._moving, (x, y, z), step, share)
+            (x, y, z), (px, py, pz) = position, self.position
+            self._moving = _blend(self._moving, (x - px, y - py, z - pz), step, share)
         self.time_s, self.quat, self.position = time_s, quat, position
+
+    def expected(self, time_s: float) -> tuple[Quat, Vector] | None:
+        """Where the head should be at `time_s`; None after too long a silence."""
+        step = time_s - self.time_s
+        return self._reached(step) if 0 <= step <= LONGEST_STEP_S else None
 
     def coast(self, time_s: float) -> None:
         """Let the head go on from its last pose to `time_s`."""
         step = max(time_s - self.time_s, 0.0)
+        self.quat, self.position = self._reached(step)
         decay = math.exp(-step / COAST_S)
-        reach = COAST_S * (1 - decay)
-        tx, ty, tz = (rate * reach for rate in self._turning)
-        angle = math.sqrt(tx * tx + ty * ty + tz * tz)
-        half_sinc = math.sin(angle / 2) / angle if angle > 0 else 0.5
-        self.quat = turned((tx * half_sinc, ty * half_sinc, tz * half_sinc, math.cos(angle / 2)), self.quat)
-        x, y, z = (at + rate * reach for at, rate in zip(self.position, self._moving, strict=True))
-        self.position = (x, y, z)
-        a, b, c = (rate * decay for rate in self._turning)
-        self._turning = (a, b, c)
-        a, b, c = (rate * decay for rate in self._moving)
-        self._moving = (a, b, c)
+        self._turning = _scaled(self._turning, decay)
+        self._moving = _scaled(self._moving, decay)
         self.time_s = time_s
+
+    def _reached(self, step: float) -> tuple[Quat, Vector]:
+        reach = COAST_S * (1 - math.exp(-step / COAST_S))
+        tx, ty, tz = _scaled(self._turning, reach)
+        angle = math.sqrt(tx * tx + ty * ty + tz * tz)
+        share = math.sin(angle / 2) / angle if angle > 0 else 0.5
+        quat = turned((tx * share, ty * share, tz * share, math.cos(angle / 2)), self.quat)
+        x, y, z = self.position
+        mx, my, mz = _scaled(self._moving, reach)
+        return quat, (x + mx, y + my, z + mz)
 
 
 def turned(a: Quat, b: Quat) -> Quat:
@@ -79,5 +86,13 @@ def small_turn(old: Quat, new: Quat) -> Vector:
 
 
 def _blend(rate: Vector, change: Vector, step: float, share: float) -> Vector:
-    a, b, c = (old + (new / step - old) * share for old, new in zip(rate, change, strict=True))
-    return (a, b, c)
+    keep, take = 1 - share, share / step
+    return (
+        rate[0] * keep + change[0] * take,
+        rate[1] * keep + change[1] * take,
+        rate[2] * keep + change[2] * take,
+    )
+
+
+def _scaled(vector: Vector, factor: float) -> Vector:
+    return (vector[0] * factor, vector[1] * factor, vector[2] * factor)

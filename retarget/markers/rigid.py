@@ -21,9 +21,18 @@ if TYPE_CHECKING:
     Quat = tuple[float, float, float, float]
     Vector = tuple[float, float, float]
 
-REWEIGHTINGS = 2
-BROKEN = 4.0
-"""A residual of the plain fit, in units of `scale`, from which a bad marker or a swap is searched for."""
+LEAST = 3
+"""Points that a rigid motion needs."""
+REWEIGHTINGS = 1
+"""After a start that is expected to be right."""
+REWEIGHTINGS_ALONE = 4
+"""Without one."""
+EXPECTED = 3.0
+"""How far from the expected pose a good marker may be, in units of `scale`."""
+BROKEN = 5.0
+"""Two residuals beyond this, in units of `scale`, and a swap is looked for."""
+DOUBTFUL = 2.0
+"""One residual beyond this, where no pose is expected, and a swap or a bad marker is looked for."""
 CLEARLY = 3.0
 """How many times better another explanation must be before it is believed."""
 
@@ -100,26 +109,39 @@ class RobustFit(NamedTuple):
     """Which of the given world points stands for each head point, where some were swapped; None where none was."""
 
 
-def fit_robust(head: Array, world: Array, scale: float) -> RobustFit:
+def fit_robust(head: Array, world: Array, scale: float, expected: Array | None = None) -> RobustFit:
     """The motion from `head` (N, 4) to `world` (N, 4), N >= 3, both finite; `scale` [m] is how far a good marker
     strays.
 
-    A fixed number of reweightings, so that the answer depends on these points alone. Where even the plain fit leaves a
-    residual of several times `scale`, each marker is left out in turn and markers are exchanged, and what explains the
-    points clearly better is the start instead.
+    `expected` is about where the head should be, T_world_head (4, 4), from the frames before: it only tells which
+    markers to doubt, so it does not hold back a fast head. A band of four in a plane needs it, because of four such
+    markers no single frame tells which one has left the plane. Where the points contradict each other all the same,
+    each marker is left out in turn and markers are exchanged, and what explains the points clearly better is the start
+    instead.
     """
-    fit = fit_rigid(head, world, np.ones((len(head), 1)))
+    weights = np.ones((len(head), 1))
+    alone = expected is None or len(head) == LEAST  # three points leave nothing to tell a bad one by
+    if expected is not None and not alone:
+        weights = _weights(squared_residuals(expected, head, world), EXPECTED * scale)
+    fit = fit_rigid(head, world, weights)
     squares = squared_residuals(fit.T_world_head, head, world)
     order = None
-    if squares.max() > (BROKEN * scale) ** 2:
+    if _contradictory(squares, scale, alone):
         fit, order = _explained(fit, head, world, scale)
         world = world if order is None else world[list(order)]
         squares = squared_residuals(fit.T_world_head, head, world)
-    if len(head) > 3:  # three points leave nothing to tell a bad one by
-        for _ in range(REWEIGHTINGS):
+    if len(head) > LEAST:
+        for _ in range(REWEIGHTINGS_ALONE if alone else REWEIGHTINGS):
             fit = fit_rigid(head, world, _weights(squares, scale))
             squares = squared_residuals(fit.T_world_head, head, world)
     return RobustFit(fit, order)
+
+
+def _contradictory(squares: Array, scale: float, alone: bool) -> bool:
+    if alone:
+        return bool(squares.max() > (DOUBTFUL * scale) ** 2)
+    worst = (BROKEN * scale) ** 2
+    return bool(np.count_nonzero(squares > worst) > 1)
 
 
 def _weights(squares: Array, scale: float) -> Array:
@@ -153,7 +175,7 @@ def _hypotheses(n: int) -> tuple[list[NDArray[np.intp]], list[Array]]:
     """Each marker left out, where enough remain; then all orders of up to four markers, else all exchanges of two."""
     orders: list[NDArray[np.intp]] = []
     weights: list[Array] = []
-    for i in range(n if n > 3 else 0):
+    for i in range(n if n > LEAST else 0):
         orders.append(np.arange(n))
         weights.append(np.ones((n, 1)))
         weights[-1][i] = 0.0

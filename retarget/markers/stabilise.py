@@ -25,7 +25,7 @@ import numpy as np
 from retarget.errors import InputError
 from retarget.frames import MarkerFrame
 from retarget.markers.head_motion import HeadMotion, turned
-from retarget.markers.rigid import Fit, fit_robust, homogeneous, pose
+from retarget.markers.rigid import LEAST, Fit, fit_robust, homogeneous, pose
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("retarget.markers")
 
-LEAST = 3
+ORIGIN = (0.0, 0.0, 0.0)
 TRUST_S = 0.1
 NARROWEST_M = 0.005
 """Head markers that spread less than this about a line do not tell the turn about it."""
@@ -94,7 +94,9 @@ class Stabiliser:
     def _fit(self, rows: NDArray[np.intp] | None, frame: MarkerFrame) -> tuple[Array, Array] | None:
         """T_world_head and the positions in ``head``; None where the seen markers stand on one line."""
         head, world = (self._template, self._world) if rows is None else (self._template[rows], self._world[rows])
-        fit, order = fit_robust(head, world, self._scale_m)
+        expected = self._motion.expected(frame.time_s) if self._motion else None
+        T_expected = None if expected is None else pose(expected[0], ORIGIN, expected[1])
+        fit, order = fit_robust(head, world, self._scale_m, T_expected)
         if fit.breadth_m < NARROWEST_M:
             return None
         self._remember(frame.time_s, fit)
@@ -130,7 +132,7 @@ class Stabiliser:
         head, world = self._template[rows, :3], self._world[rows, :3]
         if len(rows) >= 2:
             motion.quat = _aligned(motion.quat, *_widest_pair(head, world))
-        T = pose(motion.quat, (0.0, 0.0, 0.0), motion.position)
+        T = pose(motion.quat, ORIGIN, motion.position)
         if len(rows) > 0:
             T[:3, 3] = world.mean(axis=0) - T[:3, :3] @ head.mean(axis=0)
             x, y, z = T[:3, 3].tolist()
