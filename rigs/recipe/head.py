@@ -1,0 +1,205 @@
+"""Put the head together: person, cut, skin weights, parts, shapes, pictures, file."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from rigs.recipe.atlas import ISLANDS, island_of, pack
+from rigs.recipe.binding import HEAD, INFLUENCES, JAW, NECK, Binding, Bones, Regions, bind_skin, gather
+from rigs.recipe.eyes import eyeball, fit_sphere
+from rigs.recipe.glb import Look, Skeleton, write_glb
+from rigs.recipe.identity import person
+from rigs.recipe.lashes import hairs, strip_grid
+from rigs.recipe.mouth import LOWER, UPPER, teeth
+from rigs.recipe.part import Part, join, rigid, vertex_normals
+from rigs.recipe.shapes import ARKIT
+from rigs.recipe.sites import LEFT, MIDDLE, rides_jaw
+from rigs.recipe.skin import Skin, cut_head
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from rigs.recipe.source import BaseMesh, Wheel
+
+JAW_FROM_EYES_M = (0.0, -0.0267, -0.0555)
+"""The ear-to-ear hinge in front of the ear canals, seen from the middle between the eyes."""
+HEAD_FROM_EYES_M = (0.0, -0.037, -0.078)
+NECK_FROM_EYES_M = (0.0, -0.108, -0.095)
+CUT_ABOVE_NECK_M = 0.010
+CUT_TILT_DEG = 18.0
+EYES = {"eyeLeft": "helper-l-eye", "eyeRight": "helper-r-eye"}
+
+
+def build(wheel: Wheel) -> bytes:
+    """The GLB file."""
+    mesh = wheel.mesh()
+    count = len(mesh.vertices)
+    base = person(wheel, mesh)
+    units = {name: wheel.face_unit(name, count) for name in ARKIT}
+    body = mesh.groups == "body"
+    skin = cut_head(base, mesh.quads[body], mesh.uv[mesh.quad_uv[body]], _cut_plane(mesh, base))
+    lowest = skin.positions(base)[:, 1].min()
+    eyes = np.array([fit_sphere(base[_exact_group(mesh, group)])[0] for group in EYES.values()])
+    base -= [0.0, lowest, eyes[0, 2] + HEAD_FROM_EYES_M[2]]
+    positions = skin.positions(base)
+    sites = _sites(skin, wheel.mirror(count))
+    skeleton = _skeleton(mesh, base, {name: positions[vertex] for name, vertex in sites.items()})
+    bones = gather(wheel.bone_weights(count))
+    lifted = Bones(*(skin.lift @ row for row in (bones.head, bones.jaw, bones.neck)))
+    binding = bind_skin(positions, skin.triangles, sites, lifted, _regions(skin))
+    parts = [
+        _skin_part(skin, base, binding, skeleton, units),
+        _eyes_part(mesh, base, skeleton, units),
+        _mouth_part(mesh, base, skeleton, units),
+        _lashes_part(mesh, base, skin, binding, skeleton, units),
+    ]
+    looks = [
+        Look(_plain((196, 150, 128)), 0.55),
+        Look(_plain((235, 235, 235)), 0.15),
+        Look(_plain((230, 220, 200)), 0.3),
+        Look(_plain((30, 20, 15)), 0.8, double_sided=True),
+    ]
+    asset = {"generator": "retarget rigs/build_human.py", "copyright": "CC0 1.0 Universal"}
+    return write_glb("human", parts, looks, skeleton, tuple(ARKIT), asset)
+
+
+def _plain(colour: tuple[int, int, int]) -> bytes:
+    stream = io.BytesIO()
+    Image.new("RGB", (4, 4), colour).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def _exact_group(mesh: BaseMesh, group: str) -> NDArray[np.intp]:
+    return np.unique(mesh.quads[mesh.groups == group])
+
+
+def _cut_plane(mesh: BaseMesh, base: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    tilt = np.radians(CUT_TILT_DEG)
+    point = base[mesh.group_vertices("joint-neck")].mean(0) + [0.0, CUT_ABOVE_NECK_M, 0.0]
+    return point, np.array([0.0, np.cos(tilt), np.sin(tilt)])
+
+
+def _sites(skin: Skin, mirror: NDArray[np.intp]) -> dict[str, int]:
+    """The skin vertex of every site."""
+    lift = skin.lift.tocoo()
+    whole = lift.data == 1.0
+    where = dict(zip(lift.col[whole][::-1].tolist(), lift.row[whole][::-1].tolist(), strict=True))
+    sites = {name: where[vertex] for name, vertex in MIDDLE.items()}
+    for name, vertex in LEFT.items():
+        sites[name] = where[vertex]
+        sites[name.replace("Left", "Right")] = where[int(mirror[vertex])]
+    return sites
+
+
+def _skeleton(mesh: BaseMesh, base: NDArray[np.float64], sites: dict[str, NDArray[np.float64]]) -> Skeleton:
+    eyes = {name: fit_sphere(base[_exact_group(mesh, group)])[0] for name, group in EYES.items()}
+    middle = np.mean(list(eyes.values()), axis=0)
+    places = {
+        NECK: middle + NECK_FROM_EYES_M,
+        HEAD: middle + HEAD_FROM_EYES_M,
+        JAW: middle + JAW_FROM_EYES_M,
+        **eyes,
+        **sites,
+    }
+    names = tuple(places)
+    parents = {NECK: -1, HEAD: 0} | {site: names.index(JAW) for site in sites if rides_jaw(site)}
+    return Skeleton(names, tuple(parents.get(name, 1) for name in names), np.array(list(places.values())))
+
+
+def _regions(skin: Skin) -> Regions:
+    island = island_of(skin.uv)
+    inside = {}
+    for number, entry in enumerate(ISLANDS):
+        only = np.zeros(skin.lift.shape[0], dtype=bool)
+        only[skin.triangles[island == number]] = True
+        only[skin.triangles[island != number]] = False
+        inside[entry.name] = only
+    return Regions(inside["mouth"], inside["socketLeft"] | inside["socketRight"])
+
+
+def _skin_part(
+    skin: Skin,
+    base: NDArray[np.float64],
+    binding: Binding,
+    skeleton: Skeleton,
+    units: dict[str, NDArray[np.float64]],
+) -> Part:
+    """The skin with a vertex for every (place, texture coordinate) pair."""
+    positions = skin.positions(base)
+    normals = vertex_normals(positions, skin.triangles)
+    corners = np.column_stack([skin.triangles.reshape(-1, 1), np.round(pack(skin.uv).reshape(-1, 2), 6)])
+    unique, index = np.unique(corners, axis=0, return_inverse=True)
+    vertex = unique[:, 0].astype(int)
+    joints, weights = _rig_influences(binding, skeleton)
+    shapes = {name: (skin.lift @ offsets)[vertex] for name, offsets in units.items()}
+    return Part(
+        "skin", positions[vertex], normals[vertex], unique[:, 1:], index.reshape(-1, 3), joints[vertex], weights[vertex], shapes
+    )
+
+
+def _rig_influences(binding: Binding, skeleton: Skeleton) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    joints, weights = binding.influences()
+    number = np.array([skeleton.names.index(name) for name in binding.names])
+    return np.where(weights > 0, number[joints], 0), weights
+
+
+def _eyes_part(
+    mesh: BaseMesh, base: NDArray[np.float64], skeleton: Skeleton, units: dict[str, NDArray[np.float64]]
+) -> Part:
+    parts = []
+    for name, group in EYES.items():
+        vertices = _exact_group(mesh, group)
+        moved = {shape: base[vertices] + offsets[vertices] for shape, offsets in units.items() if offsets[vertices].any()}
+        parts.append(eyeball(name, base[vertices], moved, skeleton.names.index(name)))
+    return join("eyes", parts)
+
+
+def _mouth_part(
+    mesh: BaseMesh, base: NDArray[np.float64], skeleton: Skeleton, units: dict[str, NDArray[np.float64]]
+) -> Part:
+    head, jaw = skeleton.names.index(HEAD), skeleton.names.index(JAW)
+    upper, lower = (base[_exact_group(mesh, f"helper-{which}-teeth")] for which in ("upper", "lower"))
+    top = teeth("upperTeeth", UPPER, np.array([0.0, upper[:, 1].min() - 0.0005, upper[:, 2].max() - 0.0005]), head)
+    bottom = teeth("lowerTeeth", LOWER, np.array([0.0, upper[:, 1].min() + 0.0012, lower[:, 2].max() - 0.0006]), jaw)
+    tongue = _exact_group(mesh, "helper-tongue")
+    return join("mouth", [top, bottom])
+
+
+def _lashes_part(
+    mesh: BaseMesh,
+    base: NDArray[np.float64],
+    skin: Skin,
+    binding: Binding,
+    skeleton: Skeleton,
+    units: dict[str, NDArray[np.float64]],
+) -> Part:
+    from scipy.spatial import cKDTree
+
+    rng = np.random.default_rng(7)
+    tree = cKDTree(skin.positions(base))
+    near = tree.query(base)[0]
+    joints, weights = _rig_influences(binding, skeleton)
+    parts = []
+    for side in "lr":
+        for strip, count, length in (("1", 26, 0.4), ("2", 38, 0.6)):
+            grid = strip_grid(mesh.quads[mesh.groups == f"helper-{side}-eyelashes-{strip}"], near)
+            lift, triangles = hairs(grid, count, length, len(base), rng)
+            at = lift @ base
+            skin_vertex = tree.query(at)[1]
+            parts.append(
+                Part(
+                    "lashes",
+                    at,
+                    vertex_normals(at, triangles),
+                    np.full((len(at), 2), 0.5),
+                    triangles,
+                    joints[skin_vertex],
+                    weights[skin_vertex],
+                    {name: lift @ offsets for name, offsets in units.items()},
+                )
+            )
+    return join("lashes", parts)

@@ -1,0 +1,42 @@
+"""Where the facial joints stand: one vertex of the base mesh for each site, and the right side by its mirror image.
+
+The places are those of a mocap supervisor's markers; they hold for every identity, because the base mesh keeps its topology.
+"""
+
+from __future__ import annotations
+
+LEFT = {
+    "foreheadLeft": 7436,
+    "browInnerLeft": 6983,
+    "browMidLeft": 6997,
+    "browOuterLeft": 6981,
+    "noseWingLeft": 11672,
+    "lidUpperLeft": 6874,
+    "lidLowerLeft": 11479,
+    "eyeInnerLeft": 11510,
+    "eyeOuterLeft": 6812,
+    "cheekUpperLeft": 11910,
+    "cheekLowerLeft": 11892,
+    "cheekOuterLeft": 11787,
+    "lipUpperLeft": 11948,
+    "lipCornerLeft": 10405,
+    "lipLowerLeft": 7239,
+    "chinLeft": 7454,
+    "mandibleLeft": 11818,
+}
+MIDDLE = {
+    "forehead": 5192,
+    "browCenter": 227,
+    "noseBridge": 134,
+    "noseTip": 5054,
+    "lipUpper": 5342,
+    "lipLower": 496,
+    "chin": 733,
+}
+JAW_RIDERS = ("lipLower", "chin", "mandible")
+"""Beginnings of the names of the sites whose joints are children of the jaw."""
+
+
+def rides_jaw(site: str) -> bool:
+    """True where the joint of `site` is a child of the jaw."""
+    return site.startswith(JAW_RIDERS)
