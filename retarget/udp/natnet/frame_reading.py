@@ -15,7 +15,6 @@ from retarget.errors import ProtocolError
 from retarget.udp.natnet.framedata import (
     NO_BODIES,
     NO_MARKERS,
-    NO_POSITIONS,
     AnalogSamples,
     Asset,
     BodyMarkers,
@@ -27,7 +26,7 @@ from retarget.udp.natnet.framedata import (
     Skeleton,
     Ticks,
 )
-from retarget.udp.natnet.records import BODY, MARKER, body_record, marker_record
+from retarget.udp.natnet.records import BODY, MARKER, NO_POSITIONS, body_record, marker_record
 from retarget.udp.natnet.version import PrecisionForm, TimestampForm
 
 if TYPE_CHECKING:

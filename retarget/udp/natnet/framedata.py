@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from retarget.udp.natnet.records import BODY, MARKER, BodyFlag, FrameFlag, MarkerFlag, column
+from retarget.udp.natnet.records import BODY, MARKER, NO_POSITIONS, BodyFlag, FrameFlag, MarkerFlag, column
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -203,8 +203,6 @@ class PrecisionTime(NamedTuple):
     """In parts of 2**32 of a second."""
 
 
-NO_POSITIONS = np.empty((0, 3), "<f4")
-NO_POSITIONS.flags.writeable = False
 NO_MARKERS = LabelledMarkers(np.empty(0, MARKER))
 NO_BODIES = RigidBodies(np.empty(0, BODY))
 

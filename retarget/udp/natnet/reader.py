@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from retarget.errors import ProtocolError
-from retarget.udp.natnet.records import FLOAT, INT
+from retarget.udp.natnet.records import FLOAT, INT, NO_FLOATS, NO_POSITIONS
 from retarget.udp.natnet.text import text_from_octets
 
 if TYPE_CHECKING:
@@ -118,11 +118,11 @@ class Cursor:
 
     def positions(self, count: int) -> NDArray[np.float32]:
         """View `count` points, (count, 3)."""
-        return self._view((count, 3), FLOAT, 12 * count)
+        return self._view((count, 3), FLOAT, 12 * count) if count else NO_POSITIONS
 
     def floats(self, count: int) -> NDArray[np.float32]:
         """View `count` numbers, (count,)."""
-        return self._view((count,), FLOAT, 4 * count)
+        return self._view((count,), FLOAT, 4 * count) if count else NO_FLOATS
 
     def ints(self, count: int) -> NDArray[np.int32]:
         """View `count` whole numbers, (count,)."""

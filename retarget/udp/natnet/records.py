@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 FLOAT: np.dtype[np.float32] = np.dtype("<f4")
 INT: np.dtype[np.int32] = np.dtype("<i4")
 
+NO_POSITIONS: NDArray[np.float32] = np.empty((0, 3), FLOAT)
+NO_FLOATS: NDArray[np.float32] = np.empty(0, FLOAT)
+"""What empty blocks are, without an array each."""
+
 _MARKER: list[tuple[str, str] | tuple[str, str, tuple[int, ...]]] = [
     ("id", "<i4"),
     ("position", "<f4", (3,)),
