@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from retarget.frames import MarkerFrame
-from retarget.markers.layouts import listed, no_marker_known
+from retarget.markers.layouts import no_marker_known
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -82,6 +82,6 @@ class Labeller:
 
 def _report(layout: str, unmatched: tuple[str, ...], missing: tuple[str, ...]) -> None:
     if unmatched:
-        log.warning("Markers unknown to the layout %s, kept as unlabelled points: %s", layout, listed(unmatched))
+        log.warning("Markers unknown to the layout %s, kept as unlabelled points: %s", layout, ", ".join(unmatched))
     if missing:
-        log.warning("Markers of the layout %s that the source does not have: %s", layout, listed(missing))
+        log.warning("Markers of the layout %s that the source does not have: %s", layout, ", ".join(missing))
