@@ -30,6 +30,9 @@ MARGINS = {"face": 1.45, "head": 1.12, "bust": 1.08}
 BUST = 0.75
 """How far below the head a bust reaches, in heights of the head."""
 
+CHIN_DROP = 0.1
+"""How far a wide open mouth takes the chin below its rest, in heights of the head."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Camera:
@@ -63,15 +66,23 @@ def subject(rig: Rig, view: View) -> Array:
     """The points (N, 3) [m], ``rig``, that the picture must hold, from the rig at rest."""
     if view.framing == "face" and rig.sites:
         sites: Array = np.stack([site.rest for site in rig.sites.values()])
-        return sites + rig.joints.T_rig_joint[rig.head_joint, :3, 3]
+        return _with_open_mouth(sites + rig.joints.T_rig_joint[rig.head_joint, :3, 3])
     points, on_head = _all_points(rig), _on_head(rig)
     if not on_head.any():
         return points
     head: Array = points[on_head]
-    if view.framing == "bust":
-        lower, upper = head[:, 1].min(), head[:, 1].max()
-        head = points[points[:, 1] > lower - BUST * (upper - lower)]
-    return head
+    if view.framing != "bust":
+        return _with_open_mouth(head)
+    lower, upper = head[:, 1].min(), head[:, 1].max()
+    bust: Array = points[points[:, 1] > lower - BUST * (upper - lower)]
+    return bust
+
+
+def _with_open_mouth(points: Array) -> Array:
+    """The points and one more, where the chin goes."""
+    lowest = points[np.argmin(points[:, 1])]
+    drop = CHIN_DROP * (points[:, 1].max() - lowest[1])
+    return np.vstack([points, lowest - [0.0, drop, 0.0]])
 
 
 def _all_points(rig: Rig) -> Array:

@@ -52,8 +52,10 @@ class Offscreen:
         self._context.acquire()
         try:
             self._build(self._context)
-        finally:
-            self._context.release()
+        except BaseException:
+            self.close()
+            raise
+        self._context.release()
         return self
 
     def __exit__(
@@ -66,7 +68,8 @@ class Offscreen:
         if self._context is None:
             return
         self._context.acquire()
-        self._renderer.delete()
+        if self._renderer:
+            self._renderer.delete()
         self._context.close()
         self._context = None
 

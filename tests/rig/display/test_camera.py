@@ -70,5 +70,12 @@ def test_the_head_leaves_out_what_hangs_on_the_neck() -> None:
     skin, mark = RIG.surfaces
     below = np.zeros_like(mark.joints)
     rig = replace(RIG, surfaces=(skin, replace(mark, joints=below, positions=mark.positions - np.float32(0.15))))
-    assert len(subject(rig, View(framing="head"))) == len(skin.positions)
-    assert len(subject(rig, View(framing="bust"))) == len(skin.positions) + len(mark.positions)
+    head, bust = (subject(rig, View(framing=framing)) for framing in ("head", "bust"))
+    assert len(head) == len(skin.positions) + 1  # and the place of an open mouth's chin
+    assert len(bust) == len(skin.positions) + len(mark.positions)
+
+
+def test_an_open_mouth_stays_in_the_picture() -> None:
+    view = View(framing="head")
+    chin = CENTRE - [0.0, RADII[1] * 1.15, -0.05]
+    assert np.abs(projected(camera_for(RIG, view), view, chin[None])).max() < 1
