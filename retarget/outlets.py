@@ -53,15 +53,23 @@ class Outlet:
         self._capacity = capacity
         self._poses: deque[Pose] = deque()
         self._changed = threading.Condition()
-        self._opened = threading.Event()
+        self._settled = threading.Event()
+        self._is_open = False
         self._closing = False
         self._thread = threading.Thread(target=self._work, name=f"sink {name}", daemon=True)
 
     def start(self) -> None:
-        """Open the sink."""
+        """Begin to open the sink."""
         self._thread.start()
-        self._opened.wait()
-        if self.error:
+
+    def wait_open(self) -> None:
+        """Return once the sink is open; raise what opening raised."""
+        self._settled.wait()
+        self.check_opening()
+
+    def check_opening(self) -> None:
+        """Raise what opening raised, if it has failed by now."""
+        if self.error and not self._is_open:
             raise self.error
 
     @property
@@ -99,7 +107,8 @@ class Outlet:
     def _work(self) -> None:
         try:
             with self._opener() as sink:
-                self._opened.set()
+                self._is_open = True
+                self._settled.set()
                 while (pose := self._next()) is not None:
                     sink(pose)
                     self.written += 1
@@ -109,7 +118,7 @@ class Outlet:
             self._fail(RetargetError(f"{self.name} stopped: {error!r}."))
             raise
         finally:
-            self._opened.set()
+            self._settled.set()
 
     def _next(self) -> Pose | None:
         with self._changed:

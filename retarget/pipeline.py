@@ -58,7 +58,7 @@ class RunReport:
 class Run:
     """One performance from a source through a session into any number of sinks.
 
-    Use it as a context manager, which opens the source and every sink before the first frame, and closes them all:
+    Use it as a context manager, which opens the source and the sinks, and closes them all:
     sinks first take what still waits for them. `stop` ends it early from anywhere.
     """
 
@@ -94,6 +94,9 @@ class Run:
                 outlet.start()
                 stack.callback(outlet.finish)
                 self._outlets.append(outlet)
+            if not self._source.live:  # a live stream is running by now, and its frames do not wait for sinks
+                for outlet in self._outlets:
+                    outlet.wait_open()
             self._stack = stack.pop_all()
         self._started_s = time.monotonic()
         return self
@@ -121,6 +124,8 @@ class Run:
         for frame in self._source:
             self._hand_out(self._session(frame))
             on_frame()
+            for outlet in self._outlets:
+                outlet.check_opening()
             if self._outlets and all(outlet.error for outlet in self._outlets) and self._window is None:
                 break
         self._hand_out(self._session.finish())

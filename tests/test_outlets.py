@@ -81,8 +81,12 @@ def test_a_stuck_sink_keeps_the_newest_poses_and_counts_the_others() -> None:
 
 
 def test_a_sink_that_does_not_open_says_so_at_once() -> None:
+    outlet = Outlet("film", not_opening, Backlog.WAIT, 1)
+    outlet.start()
     with pytest.raises(OutputError, match=r"out\.mp4"):
-        Outlet("film", not_opening, Backlog.WAIT, 1).start()
+        outlet.wait_open()
+    with pytest.raises(OutputError, match=r"out\.mp4"):
+        outlet.check_opening()
 
 
 def test_an_error_closes_one_sink_and_never_blocks_the_source() -> None:
