@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 FIELD_OF_VIEW_RAD = np.deg2rad(20.0)
 """Of the picture's shorter side: a portrait lens, which does not swell the nose."""
 
-MARGINS = {"face": 1.45, "head": 1.12, "bust": 1.08}
+MARGINS = {"face": 1.2, "head": 1.06, "bust": 1.06}
 """How much larger the picture is than what it must show."""
 
 BUST = 0.75
