@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import io
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PIL import Image
 
+from retarget.geometry import apply, kabsch
+from rigs.recipe import pictures
 from rigs.recipe.atlas import ISLANDS, island_of, pack
 from rigs.recipe.binding import HEAD, INFLUENCES, JAW, NECK, Binding, Bones, Regions, bind_skin, gather
+from rigs.recipe.complexion import Ground, complexion
 from rigs.recipe.eyes import eyeball, fit_sphere
 from rigs.recipe.glb import Look, Skeleton, write_glb
 from rigs.recipe.identity import person
 from rigs.recipe.lashes import hairs, strip_grid
-from rigs.recipe.mouth import LOWER, UPPER, teeth
+from rigs.recipe.mouth import LOWER, UPPER, teeth, tongue
+from rigs.recipe.occlusion import openness, smooth
+from rigs.recipe.paint import Canvas, canvas, jpeg, look_up, png
 from rigs.recipe.part import Part, join, rigid, vertex_normals
 from rigs.recipe.shapes import ARKIT
 from rigs.recipe.sites import LEFT, MIDDLE, rides_jaw
-from rigs.recipe.skin import Skin, cut_head
+from rigs.recipe.skin import Skin, cut_head, triangulate
+from rigs.recipe.weights import surface_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,6 +36,8 @@ HEAD_FROM_EYES_M = (0.0, -0.037, -0.078)
 NECK_FROM_EYES_M = (0.0, -0.108, -0.095)
 CUT_ABOVE_NECK_M = 0.010
 CUT_TILT_DEG = 18.0
+SKIN_SIZE, SKIN_QUALITY = 1024, 90
+LASH = (34, 25, 21)
 EYES = {"eyeLeft": "helper-l-eye", "eyeRight": "helper-r-eye"}
 
 
@@ -57,20 +64,43 @@ def build(wheel: Wheel) -> bytes:
         _mouth_part(mesh, base, skeleton, units),
         _lashes_part(mesh, base, skin, binding, skeleton, units),
     ]
+    spots = {name: positions[vertex] - eye_middle(skeleton) for name, vertex in sites.items()}
+    layer = canvas(pack(skin.uv), SKIN_SIZE)
+    ground = _ground(layer, skin, positions - eye_middle(skeleton), wheel.lip_mask())
     looks = [
-        Look(_plain((196, 150, 128)), 0.55),
-        Look(_plain((235, 235, 235)), 0.15),
-        Look(_plain((230, 220, 200)), 0.3),
-        Look(_plain((30, 20, 15)), 0.8, double_sided=True),
+        Look(jpeg(layer.picture(complexion(ground, spots)), SKIN_QUALITY), 0.62),
+        Look(jpeg(pictures.eye(), 92), 0.12),
+        Look(jpeg(pictures.mouth(), 90), 0.35),
+        Look(png(np.full((4, 4, 3), LASH, dtype=np.uint8)), 0.9, double_sided=True),
     ]
     asset = {"generator": "retarget rigs/build_human.py", "copyright": "CC0 1.0 Universal"}
     return write_glb("human", parts, looks, skeleton, tuple(ARKIT), asset)
 
 
-def _plain(colour: tuple[int, int, int]) -> bytes:
-    stream = io.BytesIO()
-    Image.new("RGB", (4, 4), colour).save(stream, "PNG")
-    return stream.getvalue()
+def eye_middle(skeleton: Skeleton) -> NDArray[np.float64]:
+    """The middle (3,) [m] between the two eyes."""
+    return np.asarray(np.mean([skeleton.positions[skeleton.names.index(name)] for name in EYES], axis=0))
+
+
+def _ground(layer: Canvas, skin: Skin, place: NDArray[np.float64], lip_mask: NDArray[np.float64]) -> Ground:
+    triangles = skin.triangles
+    island = island_of(skin.uv)
+    inside = {entry.name: island == number for number, entry in enumerate(ISLANDS)}
+    behind_lids = inside["socketLeft"] | inside["socketRight"]
+    depth = surface_distance(place, triangles, np.unique(triangles[~inside["mouth"]]))
+    rim = surface_distance(place, triangles, np.intersect1d(triangles[behind_lids], triangles[~behind_lids]))
+    light = openness(place, triangles, vertex_normals(place, triangles))
+    source_uv = layer.sample(skin.uv)
+    return Ground(
+        place=layer.sample(place[triangles]),
+        openness=layer.sample(smooth(light, triangles, 2)[triangles]),
+        lips=look_up(lip_mask, source_uv),
+        source_uv=source_uv,
+        mouth_m=layer.sample(depth[triangles]) * inside["mouth"][layer.triangle],
+        rim_m=layer.sample(rim[triangles]),
+        socket=behind_lids[layer.triangle].astype(float),
+        brows=inside["face"][layer.triangle] * (layer.sample(place[triangles])[:, 2] > -0.02),
+    )
 
 
 def _exact_group(mesh: BaseMesh, group: str) -> NDArray[np.intp]:
@@ -162,11 +192,27 @@ def _mouth_part(
     mesh: BaseMesh, base: NDArray[np.float64], skeleton: Skeleton, units: dict[str, NDArray[np.float64]]
 ) -> Part:
     head, jaw = skeleton.names.index(HEAD), skeleton.names.index(JAW)
-    upper, lower = (base[_exact_group(mesh, f"helper-{which}-teeth")] for which in ("upper", "lower"))
-    top = teeth("upperTeeth", UPPER, np.array([0.0, upper[:, 1].min() - 0.0005, upper[:, 2].max() - 0.0005]), head)
-    bottom = teeth("lowerTeeth", LOWER, np.array([0.0, upper[:, 1].min() + 0.0012, lower[:, 2].max() - 0.0006]), jaw)
-    tongue = _exact_group(mesh, "helper-tongue")
-    return join("mouth", [top, bottom])
+    helpers = {which: _exact_group(mesh, f"helper-{which}-teeth") for which in ("upper", "lower")}
+    edge = base[helpers["upper"]].min(0)[1] - 0.0024
+    front = base[helpers["upper"]].max(0)[2] - 0.0004
+    top = teeth("upperTeeth", UPPER, np.array([0.0, edge, front]), head)
+    bottom = teeth("lowerTeeth", LOWER, np.array([0.0, edge + 0.0012, front - 0.0026]), jaw)
+    bottom = _follow(bottom, base[helpers["lower"]], {name: offsets[helpers["lower"]] for name, offsets in units.items()})
+    vertices = _exact_group(mesh, "helper-tongue")
+    quads = np.searchsorted(vertices, mesh.quads[mesh.groups == "helper-tongue"])
+    at = base[vertices]
+    triangles = np.take_along_axis(quads[:, None, :], triangulate(quads, at), axis=2).reshape(-1, 3)
+    moved = {name: offsets[vertices] for name, offsets in units.items() if offsets[vertices].any()}
+    return join("mouth", [top, bottom, tongue(at, triangles, jaw, moved)])
+
+
+def _follow(part: Part, helper: NDArray[np.float64], offsets: dict[str, NDArray[np.float64]]) -> Part:
+    """The part with the rigid motion that each shape gives to the helper (N, 3) [m] in its place."""
+    shapes = {}
+    for name, moved in offsets.items():
+        if moved.any():
+            shapes[name] = apply(kabsch(helper, helper + moved), part.positions) - part.positions
+    return replace(part, shapes=shapes)
 
 
 def _lashes_part(

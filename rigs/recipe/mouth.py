@@ -34,11 +34,13 @@ class Arch:
 UPPER = Arch((8.4, 6.6, 7.6, 7.0, 6.6, 10.0, 9.5), (10.0, 8.8, 9.8, 8.4, 8.0, 7.4, 7.0), 0.0275, 0.044, 1)
 LOWER = Arch((5.4, 5.9, 6.8, 7.0, 7.0, 11.0, 10.5), (8.6, 9.0, 10.0, 8.4, 8.0, 7.4, 7.0), 0.0255, 0.042, -1)
 
+CREST = 0.34
+"""Texture row where the gum ends."""
 _ROWS = (
     # (height in crowns from the cutting edge, outwards in mm, texture row)
     (1.75, -1.6, 0.00),
     (1.25, 0.3, 0.18),
-    (1.00, 0.0, 0.34),
+    (1.00, 0.0, CREST),
     (0.55, 0.55, 0.60),
     (0.12, 0.15, 0.86),
     (0.00, -0.7, 0.92),
@@ -49,40 +51,70 @@ _ROWS = (
 
 def teeth(name: str, arch: Arch, front: NDArray[np.float64], joint: int) -> Part:
     """The teeth of one arch; `front` (3,) [m] is the middle of the cutting edge."""
-    place, phase, crown = _columns(arch)
-    half = len(place)
+    columns = _columns(arch)
+    half = len(columns.place)
     side = np.r_[-np.ones(half - 1), np.ones(half)]
     fold = np.r_[np.arange(half - 1, 0, -1), np.arange(half)]
-    centre, outwards = _along(arch, place)
-    centre, outwards = centre[fold] * np.c_[side, np.ones(len(side))], outwards[fold] * np.c_[side, np.ones(len(side))]
-    phase, crown, place = phase[fold], crown[fold], place[fold] / place[-1]
-    gap = np.abs(2 * phase - 1) ** 5
+    centre, outwards = (values[fold] * np.c_[side, np.ones(len(side))] for values in _along(arch, columns.place))
+    gap = np.abs(2 * columns.phase[fold] - 1) ** 5
+    back = columns.place[fold] / columns.place[-1]
     positions, uv = [], []
     for height, bulge, row in _ROWS:
-        scallop = 0.12 * gap if 0.5 < height < 1.5 else 0.0
-        cut = 0.9 * gap if height < 0.2 else 0.0
-        out = bulge - 1.1 * gap * (height < 1.1) - 0.4 * place
-        thick = 1 + 1.2 * np.clip((place - 0.4) * 2.5, 0, 1) * (bulge < -1 and height < 1.5)
-        flat = centre + outwards * (out * thick)[:, None] * 1e-3
-        up = arch.rise * (crown * (height - scallop) + cut) * 1e-3
+        thick = 1 + 1.2 * np.clip((back - 0.4) * 2.5, 0, 1) * (bulge < -1 and height < 1.5)
+        out = bulge * thick - 1.1 * gap * (height < 1.1) - 0.4 * back
+        flat = centre + outwards * out[:, None] * 1e-3
+        lowered = 0.12 * gap if 0.5 < height < 1.5 else 0.0
+        rounded = 0.9 * gap if height < 0.2 else 0.0
+        up = arch.rise * (columns.crown_mm[fold] * (height - lowered) + rounded) * 1e-3
         positions.append(np.stack([flat[:, 0], up, flat[:, 1]], axis=1) + front)
-        uv.append(np.stack([place, np.full(len(place), 0.5 * row)], axis=1))
+        uv.append(np.stack([columns.picture[fold], np.full(len(fold), 0.5 * row)], axis=1))
     triangles = _grid_triangles(len(_ROWS), len(side))
     triangles = triangles if arch.rise > 0 else triangles[:, ::-1]
     at = np.concatenate(positions)
     return Part(name, at, vertex_normals(at, triangles), np.concatenate(uv), triangles, *rigid(len(at), joint), {})
 
 
-def _columns(arch: Arch) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Arc length [m], phase in [0, 1] across the tooth and crown height [mm] of every column from the midline back."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Columns:
+    """Columns of vertices from the midline back; (C,) each."""
+
+    place: NDArray[np.float64]
+    """Arc length [m]."""
+    phase: NDArray[np.float64]
+    """0 to 1 across each tooth."""
+    crown_mm: NDArray[np.float64]
+    picture: NDArray[np.float64]
+    """Column of the picture, in which every tooth has the width of the upper one."""
+
+
+def _columns(arch: Arch) -> _Columns:
+    phases = np.arange(1, COLUMNS + 1) / COLUMNS
+    tooth = np.r_[0, np.repeat(np.arange(len(arch.widths_mm)), COLUMNS)]
+    phase = np.r_[0, np.tile(phases, len(arch.widths_mm))]
     edges = np.cumsum([0.0, *arch.widths_mm]) * 1e-3
-    place, phase, crown = [0.0], [0.0], [arch.crown_mm[0]]
-    for tooth, (start, end) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
-        for k in range(1, COLUMNS + 1):
-            place.append(start + (end - start) * k / COLUMNS)
-            phase.append(k / COLUMNS)
-            crown.append(arch.crown_mm[tooth])
-    return np.array(place), np.array(phase), np.array(crown)
+    painted = picture_edges()
+    return _Columns(
+        edges[tooth] + phase * np.diff(edges)[tooth],
+        phase,
+        np.array(arch.crown_mm)[tooth],
+        painted[tooth] + phase * np.diff(painted)[tooth],
+    )
+
+
+def picture_edges() -> NDArray[np.float64]:
+    """Where the teeth begin and end in the picture, from 0 (midline) to 1."""
+    return np.cumsum([0.0, *UPPER.widths_mm]) / sum(UPPER.widths_mm)
+
+
+def tongue(
+    positions: NDArray[np.float64], triangles: NDArray[np.intp], joint: int, shapes: dict[str, NDArray[np.float64]]
+) -> Part:
+    """The tongue (V, 3) [m], root at the back, with its share of the picture."""
+    low, high = positions.min(0), positions.max(0)
+    unit = (positions - low) / (high - low)
+    uv = np.stack([unit[:, 2], 0.52 + 0.46 * unit[:, 0]], axis=1)
+    normals = vertex_normals(positions, triangles)
+    return Part("tongue", positions, normals, uv, triangles, *rigid(len(positions), joint), shapes)
 
 
 def _along(arch: Arch, place: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

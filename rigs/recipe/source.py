@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import gzip
 import hashlib
+import io
 import json
 import zipfile
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PIL import Image
 
 from retarget.errors import InputError
 
@@ -73,6 +75,11 @@ class Wheel:
     def face_unit(self, name: str, count: int) -> NDArray[np.float64]:
         """Offsets (count, 3) [m] of the ARKit face unit `name`, such as ``jawOpen``."""
         return _parse_target(self._zip.read(f"{_DATA}faceunits01/targets/faceunits/{name}.target"), count)
+
+    def lip_mask(self) -> NDArray[np.float64]:
+        """(H, W) in [0, 1], 1 on the red of the lips, in the layout of the base mesh's texture coordinates."""
+        with Image.open(io.BytesIO(self._zip.read(_DATA + "mpfb2/textures/mpfb_lips.jpg"))) as picture:
+            return np.asarray(picture.convert("L")) / 255.0
 
     def mirror(self, count: int) -> NDArray[np.intp]:
         """(count,) the vertex on the other side of the body for every vertex."""
