@@ -25,7 +25,7 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -132,16 +132,17 @@ def _read_rig(path: Path) -> Rig:
     if root.values.get("version", 1) != 1:
         raise root.wrong("version", "must be 1, the only version there is")
     named = _named_joints(root)
-    mesh = path.parent / root.string("mesh")
-    joints, surfaces, shape_names = _read_mesh(mesh, {table.string(key) for table, key in named.values()})
-    places = {what: _joint(joints, table, key, mesh.name) for what, (table, key) in named.items()}
+    file = root.string("mesh")
+    mesh = _read_mesh(path.parent / file, {table.string(key) for table, key in named.values()})
+    joints = mesh.joints
+    places = {what: _joint(mesh, table, key, file) for what, (table, key) in named.items()}
     origin = joints.T_rig_joint[places["head"], :3, 3]
     return Rig(
         name=root.string("name"),
         path=path,
         joints=joints,
-        surfaces=surfaces,
-        shape_names=shape_names,
+        surfaces=mesh.surfaces,
+        shape_names=mesh.shape_names,
         sites=_sites(root.table("sites"), joints, places, origin),
         head_joint=places["head"],
         neck_joint=places.get("neck"),
@@ -163,20 +164,30 @@ def _named_joints(root: Table) -> dict[str, tuple[Table, str]]:
     return named | {f"sites.{site}": (sites, site) for site in sites.values}
 
 
-def _read_mesh(path: Path, named: Collection[str]) -> tuple[Joints, tuple[Surface, ...], tuple[str, ...]]:
-    """Joints, surfaces and names of the blend shapes of a GLB; `named` nodes are joints even without a skin."""
+class _Mesh(NamedTuple):
+    """What a GLB holds."""
+
+    joints: Joints
+    surfaces: tuple[Surface, ...]
+    shape_names: tuple[str, ...]
+    node_names: tuple[str, ...]
+    """Of all nodes: what could be a joint."""
+
+
+def _read_mesh(path: Path, named: Collection[str]) -> _Mesh:
+    """The GLB at `path`; `named` nodes are joints even without a skin."""
     glb = read_glb(path)
     nodes = read_nodes(glb)
     skeleton = read_skeleton(glb, nodes, named)
     surfaces, shape_names = read_surfaces(glb, nodes, skeleton)
-    return skeleton.joints(), surfaces, shape_names
+    return _Mesh(skeleton.joints(), surfaces, shape_names, nodes.names)
 
 
-def _joint(joints: Joints, table: Table, key: str, mesh: str) -> int:
+def _joint(mesh: _Mesh, table: Table, key: str, file: str) -> int:
     name = table.string(key)
-    if name not in joints.names:
-        raise table.wrong(key, f"names the joint {name!r}, which {mesh} does not have{_near(name, joints.names)}")
-    return joints.index(name)
+    if name not in mesh.joints.names:
+        raise table.wrong(key, f"names the joint {name!r}, which {file} does not have{_near(name, mesh.node_names)}")
+    return mesh.joints.index(name)
 
 
 def _sites(table: Table, joints: Joints, places: dict[str, int], origin: Array) -> dict[str, Site]:
@@ -221,4 +232,4 @@ def _below(joints: Joints, top: int) -> frozenset[int]:
 
 def _near(name: str, known: Collection[str]) -> str:
     near = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    return f" (did you mean {near[0]!r}?)" if near else ""
