@@ -90,7 +90,7 @@ class Run:
             stack.enter_context(self._source)
             settings = self._settings(self._source)
             for target in self._targets:
-                outlet = open_outlet(target, settings, live=self._source.live)
+                outlet = open_outlet(target, settings, live=self._source.live or self._window is not None)
                 outlet.start()
                 stack.callback(outlet.finish)
                 self._outlets.append(outlet)

@@ -33,6 +33,13 @@ def test_a_stream_at_twice_the_rate_gives_every_second_pose() -> None:
     assert [clock.due(i / 120) for i in range(8)] == [1, 0] * 4
 
 
+@pytest.mark.parametrize(("stream_hz", "picture_hz"), [(240, 60), (120, 12), (120, 24), (60, 30)])
+def test_each_picture_shows_the_pose_of_its_own_time(stream_hz: int, picture_hz: int) -> None:
+    clock = PictureClock(picture_hz)
+    drawn = [i for i in range(stream_hz * 20) if clock.due(i / stream_hz)]
+    assert drawn == list(range(0, stream_hz * 20, stream_hz // picture_hz))
+
+
 def test_a_gap_is_filled_so_that_the_film_keeps_its_time() -> None:
     clock = PictureClock(60.0)
     assert [clock.due(t / 60) for t in (0, 1, 5, 6)] == [1, 1, 4, 1]
