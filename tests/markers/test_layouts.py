@@ -14,49 +14,14 @@ from tests.markers.takes import HEADBAND, JAW, recording
 if TYPE_CHECKING:
     from pathlib import Path
 
-SITES = [
-    "forehead",
-    "foreheadLeft",
-    "foreheadRight",
-    "browInnerLeft",
-    "browInnerRight",
-    "browMidLeft",
-    "browMidRight",
-    "browOuterLeft",
-    "browOuterRight",
-    "browCenter",
-    "noseBridge",
-    "noseTip",
-    "noseWingLeft",
-    "noseWingRight",
-    "lidUpperLeft",
-    "lidUpperRight",
-    "lidLowerLeft",
-    "lidLowerRight",
-    "eyeInnerLeft",
-    "eyeInnerRight",
-    "eyeOuterLeft",
-    "eyeOuterRight",
-    "cheekUpperLeft",
-    "cheekUpperRight",
-    "cheekLowerLeft",
-    "cheekLowerRight",
-    "cheekOuterLeft",
-    "cheekOuterRight",
-    "lipUpper",
-    "lipUpperLeft",
-    "lipUpperRight",
-    "lipCornerLeft",
-    "lipCornerRight",
-    "lipLower",
-    "lipLowerLeft",
-    "lipLowerRight",
-    "chin",
-    "chinLeft",
-    "chinRight",
-    "mandibleLeft",
-    "mandibleRight",
-]
+FACE = """
+    forehead foreheadLeft foreheadRight browInnerLeft browInnerRight browMidLeft browMidRight browOuterLeft
+    browOuterRight browCenter noseBridge noseTip noseWingLeft noseWingRight lidUpperLeft lidUpperRight lidLowerLeft
+    lidLowerRight eyeInnerLeft eyeInnerRight eyeOuterLeft eyeOuterRight cheekUpperLeft cheekUpperRight cheekLowerLeft
+    cheekLowerRight cheekOuterLeft cheekOuterRight lipUpper lipUpperLeft lipUpperRight lipCornerLeft lipCornerRight
+    lipLower lipLowerLeft lipLowerRight chin chinLeft chinRight mandibleLeft mandibleRight
+"""
+SITES = FACE.split()
 CARD = """
 version = 1
 name = "mine"
