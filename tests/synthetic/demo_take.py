@@ -51,14 +51,14 @@ def _performance(rng: np.random.Generator) -> FaceMotion:
     accents = sum(bump(t, at, 0.15, 0.1, 0.35) for at in (4.7, 5.9, 7.1))
     afterglow = bump(t, 7.5, 0.3, 0.0, 0.3) + bump(t, 9.35, 0.3, 0.2, 0.14)
     strengths = {
-        "browsUp": _sides(brows + 0.55 * accents + 0.6 * wide, 1.0, 0.9),
+        "browsUp": _sides(1.3 * brows + 0.6 * accents + 0.7 * wide, 1.0, 0.9),
         "browsDown": 0.35 * bump(t, 6.2, 0.3, 0.3, 0.3),
-        "smile": _sides(smile + 0.25 * afterglow, 0.93, 1.0) + 0.25 * np.maximum(-rounding, 0.0)[:, None],
-        "squint": _sides(0.7 * smile, 1.0, 0.9),
-        "pucker": 0.75 * np.maximum(rounding, 0.0),
+        "smile": _sides(1.3 * smile + 0.3 * afterglow, 0.93, 1.0) + 0.4 * np.maximum(-rounding, 0.0)[:, None],
+        "squint": _sides(smile, 1.0, 0.9),
+        "pucker": 0.9 * np.maximum(rounding, 0.0),
         "press": closure,
     }
-    jaw_rad = np.radians(11.0) * jaw + 0.95 * WIDE_OPEN_RAD * wide + np.radians(1.5) * smile
+    jaw_rad = np.radians(15.0) * jaw + 0.95 * WIDE_OPEN_RAD * wide + np.radians(1.5) * smile
     nod, shake, tilt = -4 * brows - 7 * wide + 3 * accents, 5 * bump(t, 4.4, 0.8, 1.5, 0.9), 5 * smile
     alive = bump(t, STILL_S, 0.6, SECONDS, 1.0)
     T_world_head = head_motion(t, rng, alive, np.stack([nod, shake, tilt], axis=1))
