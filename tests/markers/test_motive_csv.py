@@ -98,6 +98,11 @@ def test_file_cut_at_every_byte_gives_whole_frames_or_one_sentence(tmp_path: Pat
     assert 1 in counts
 
 
+def test_file_with_fewer_frames_than_its_header_says_is_told_to_be_cut(tmp_path: Path) -> None:
+    clip = read_motive_csv(written(tmp_path, MOTIVE_2.replace("Length", "Total Exported Frames,900,Length")))
+    assert clip.notes[-1] == "The file is cut: it holds 2 whole frames where its header says 900."
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [
@@ -107,6 +112,7 @@ def test_file_cut_at_every_byte_gives_whole_frames_or_one_sentence(tmp_path: Pat
         (MOTIVE_2.replace("Marker,", "Bone,").replace("Marker\n", "Bone\n"), "holds no markers"),
         (MOTIVE_2.replace("Head:chin", "Unlabeled 1").replace("Face:nose", "Unlabeled 2"), "no named markers"),
         (MOTIVE_2.replace("Millimeters", "Furlongs"), "unit 'Furlongs'"),
+        (MOTIVE_2 + '"' + "x" * 200_000, "damaged"),
         (MOTIVE_2[: MOTIVE_2.index("0,0.000000")], "no frames"),
     ],
 )
