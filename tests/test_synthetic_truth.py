@@ -18,6 +18,7 @@ from retarget.markers.stabilise import Stabiliser
 from retarget.performer import gain_matrix
 from retarget.rig.fit import performer_from_neutral
 from retarget.rig.joints import JointMapping
+from retarget.rig.load import load_rig
 from tests.synthetic.capture import captured, with_dropouts, with_noise, with_outliers
 from tests.synthetic.demo_take import RATE_HZ, STILL_S, demo_take
 from tests.synthetic.face import ALL_SITES, FACE24_SITES, HEAD_BAND, SyntheticFace, face_layout, make_face
@@ -87,6 +88,17 @@ def test_with_K_known_joints_and_jaw_come_back(layout: str, axes: Literal["plain
     assert np.degrees(np.ptp(take.performer_jaw_rad)) > 5
     assert result.joints_m.max() < 1e-9
     assert np.degrees(np.abs(result.jaw_rad).max()) < 1e-6
+
+
+def test_on_the_shipped_rig_the_truth_comes_back_too() -> None:
+    rng = np.random.default_rng(9)
+    face = make_face(load_rig("human"), LAYOUTS["all"], rng)
+    take = captured(face, everything(face.rig, np.arange(60) / 60, rng))
+    mapping = JointMapping(face.rig, face.layout, face.performer)
+    result = score(take, take.stabilised(), mapping, face.rig)
+    assert len(mapping.sites) == 41
+    assert result.joints_m.max() < 1e-4
+    assert np.degrees(np.abs(result.jaw_rad).max()) < 0.1
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
