@@ -50,5 +50,5 @@ def test_a_file_that_is_no_configuration_by_its_size_is_not_read(tmp_path: Path)
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="The test file .* cannot be read"):
+    with pytest.raises(InputError, match=r"The test file .* cannot be read"):
         read_table(tmp_path, "test file")
