@@ -15,7 +15,7 @@ import numpy as np
 from retarget.errors import DisplayError
 from retarget.rig.display.camera import camera_for
 from retarget.rig.display.platform import Context
-from retarget.rig.display.shading import GROUND, SKY
+from retarget.rig.display.shading import EVENLY
 from retarget.rig.display.view import View
 
 if TYPE_CHECKING:
@@ -95,10 +95,10 @@ class Offscreen:
         try:
             for surface, positions, normals in zip(self._surfaces, deformed.positions, deformed.normals, strict=True):
                 surface.update(positions, normals, self._R_rig_camera)
-            large = self._renderer.render(self._scene, self._flags)
+            pixels = self._renderer.render(self._scene, self._flags)
         finally:
             self._context.release()
-        return self._reduced(large)
+        return _picture(pixels, self._view)
 
     def _build(self, context: Context) -> None:
         pyrender = import_module("pyrender")
@@ -107,7 +107,7 @@ class Offscreen:
         kind = scenes.VertexLitSurface if per_vertex else scenes.PixelLitSurface
         self._flags = pyrender.RenderFlags.OFFSCREEN | (pyrender.RenderFlags.FLAT if per_vertex else 0)
         self._surfaces = [kind(surface) for surface in self._rig.surfaces]
-        self._scene = pyrender.Scene(ambient_light=(SKY + GROUND) / 2)
+        self._scene = pyrender.Scene(ambient_light=EVENLY)
         self._scene.add(scenes.mesh_of(self._surfaces))
         camera = self._scene.add(pyrender.PerspectiveCamera(yfov=1.0))
         scenes.studio(camera, self._scene)
@@ -128,12 +128,13 @@ class Offscreen:
         self._renderer.viewport_height = view.height * view.supersampling
         self._R_rig_camera = camera.T_rig_camera[:3, :3].astype(np.float32)
 
-    def _reduced(self, large: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        if self._view.supersampling == 1:
-            return np.ascontiguousarray(large)
-        cv2 = import_module("cv2")
-        size = (self._view.width, self._view.height)
-        return np.asarray(cv2.resize(large, size, interpolation=cv2.INTER_AREA), np.uint8)
+
+def _picture(pixels: NDArray[np.uint8], view: View) -> NDArray[np.uint8]:
+    """(H, W, 3), upper row first, of RGBA pixels (n H, n W, 4), lower row first: each the mean of its samples."""
+    cv2 = import_module("cv2")
+    if view.supersampling > 1:
+        pixels = cv2.resize(pixels, (view.width, view.height), interpolation=cv2.INTER_AREA)
+    return np.asarray(cv2.cvtColor(cv2.flip(pixels, 0), cv2.COLOR_RGBA2RGB), np.uint8)
 
 
 def _linear_skin(rig: Rig) -> Callable[[Pose], Deformed]:

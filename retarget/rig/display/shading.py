@@ -21,14 +21,16 @@ def _units(rows: ArrayLike) -> Floats:
     return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True), np.float32)
 
 
-LIGHT_DIRECTIONS = _units([[-0.55, 0.55, 0.75], [0.85, 0.1, 0.65], [0.45, 0.75, -0.6]])
+LIGHT_DIRECTIONS = _units([[-0.6, 0.6, 0.7], [0.85, 0.1, 0.65], [0.45, 0.75, -0.6]])
 """(3, 3): towards the key, the fill and the rim light, ``camera``."""
-LIGHT_COLORS = np.array([[0.80, 0.76, 0.71], [0.20, 0.22, 0.26], [0.30, 0.32, 0.36]], np.float32)
+LIGHT_COLORS = np.array([[0.94, 0.89, 0.82], [0.13, 0.15, 0.19], [0.30, 0.32, 0.36]], np.float32)
 """(3, 3) linear RGB that each gives a white surface that faces it."""
-SKY, GROUND = np.array([0.20, 0.21, 0.23], np.float32), np.array([0.10, 0.085, 0.075], np.float32)
+SKY, GROUND = np.array([0.16, 0.17, 0.19], np.float32), np.array([0.08, 0.07, 0.06], np.float32)
 """Linear RGB of the light from all around, at a normal that points up and down."""
-WRAP = np.float32(0.25)
+WRAP = np.float32(0.2)
 """How far light creeps round past the horizon, as the cosine that still gets none."""
+EVENLY = (SKY + GROUND) / 2 + WRAP / (1 + WRAP) / 3 * LIGHT_COLORS[:2].sum(axis=0)
+"""Linear RGB from all around for a shader that knows neither sky nor wrapping: about as bright in the mean."""
 
 
 def srgb_from_linear(linear: ArrayLike) -> Floats:

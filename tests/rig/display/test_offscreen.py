@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 from retarget.errors import DisplayError
+from retarget.geometry import quat_from_axis_angle, quat_multiply
 from retarget.rig.display import shading
 from retarget.rig.display.camera import camera_for
 from retarget.rig.display.offscreen import Offscreen
+from retarget.rig.display.platform import Context
 from retarget.rig.display.view import View
+from retarget.rig.load import load_rig
 from retarget.rig.model import Material
 from retarget.rig.posing import rest_pose
 from tests.rig.display.heads import CENTRE, RADII, SKIN_COLOR, head_pose, head_rig
@@ -152,6 +155,35 @@ def test_supersampling_smooths_the_outline_and_keeps_its_place() -> None:
     between = (smooth[..., 1] > 190) & covered(smooth)
     assert between.sum() > 100
     assert not ((rough[..., 1] > 190) & covered(rough)).any()
+
+
+def test_a_graphics_card_lights_every_pixel_and_smooths_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    by_pixel = picture_of(view=replace(SMALL, shading="pixel"))
+    monkeypatch.setattr(Context, "is_software", False)
+    card = picture_of()
+    assert tuple(card[0, 0]) == GREEN
+    assert ((card[..., 1] > 190) & covered(card)).sum() > 100  # edges between face and ground
+    inside = (by_pixel[..., 1] < 190) & (card[..., 1] < 190)
+    assert np.abs(card.astype(int) - by_pixel)[inside].mean() < 2
+
+
+def test_the_human_opens_the_mouth_and_leaves_the_brow_alone() -> None:
+    rig = load_rig("human")
+    assert rig.jaw is not None
+    rest = rest_pose(rig)
+    turn = quat_from_axis_angle(rig.jaw.axis, np.deg2rad(20))
+    rotations = rest.rotations.copy()
+    rotations[rig.jaw.joint] = quat_multiply(rotations[rig.jaw.joint], turn)
+    view = View(240, 240, supersampling=1)
+    with Offscreen(rig, view) as offscreen:
+        shut, wide = offscreen.render(rest), offscreen.render(replace(rest, rotations=rotations))
+    assert 0.25 < covered(shut).mean() < 0.6
+    for picture in (shut, wide):
+        for corner in (picture[0, 0], picture[0, -1], picture[-1, 0], picture[-1, -1]):
+            assert tuple(corner) == GREEN
+    changed = (shut != wide).any(axis=-1)
+    assert changed[160:].sum() > 1000
+    assert not changed[:90].any()
 
 
 def test_a_new_view_takes_effect_at_the_next_picture() -> None:
