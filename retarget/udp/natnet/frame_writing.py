@@ -75,10 +75,10 @@ def _section(
 
 def _write_suffix(out: Writer, frame: FrameOfData, layout: BitstreamLayout) -> None:
     if layout.software_latency:
-        out.pack(_FLOAT32, frame.software_latency or 0.0)
+        out.pack(_FLOAT32, _or_zero(frame.software_latency))
     out.pack(_TIMECODE, frame.timecode, frame.timecode_subframe)
     if layout.timestamp is not TimestampForm.ABSENT:
-        out.pack(_FLOAT64 if layout.timestamp is TimestampForm.FLOAT64 else _FLOAT32, frame.timestamp_s or 0.0)
+        out.pack(_FLOAT64 if layout.timestamp is TimestampForm.FLOAT64 else _FLOAT32, _or_zero(frame.timestamp_s))
     if layout.ticks:
         ticks = frame.ticks
         out.pack(_TICKS, *((ticks.mid_exposure, ticks.received, ticks.transmit) if ticks else (0, 0, 0)))
@@ -86,6 +86,10 @@ def _write_suffix(out: Writer, frame: FrameOfData, layout: BitstreamLayout) -> N
     if layout.params:
         out.pack(_PARAMS, frame.params)
     out.int32(_END)
+
+
+def _or_zero(value: float | None) -> float:
+    return 0.0 if value is None else value
 
 
 def _write_precision(out: Writer, frame: FrameOfData, layout: BitstreamLayout) -> None:

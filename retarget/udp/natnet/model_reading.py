@@ -162,7 +162,7 @@ def _asset_marker(cursor: Cursor) -> AssetMarkerDescription:
         name=cursor.text(),
         id=cursor.int32(),
         position=cursor.floats(3),
-        size=cursor.floats(1).reshape(()),
+        size=cursor.floats(1)[0],
         params=cursor.unpack(_PARAMS)[0],
     )
 

@@ -166,7 +166,7 @@ def _asset_marker(out: Writer, marker: AssetMarkerDescription) -> None:
     out.text(marker.name)
     out.int32(marker.id)
     out.floats(marker.position, 3)
-    out.floats(marker.size)
+    out.floats(np.asarray(marker.size, FLOAT))
     out.pack(_PARAMS, marker.params)
 
 

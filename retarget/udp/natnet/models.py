@@ -110,8 +110,8 @@ class AssetMarkerDescription:
     id: int
     position: NDArray[np.float32]
     """(3,) [m]."""
-    size: NDArray[np.float32]
-    """() diameter [m]."""
+    size: np.float32
+    """Diameter [m]."""
     params: int
 
 
