@@ -51,8 +51,8 @@ def read_c3d(path: Path) -> MarkerClip:
     unit.
     """
     header = read_header(path, _bytes_of(path))
-    point, points, residuals = _parse(path)
-    seen = _seen_positions(path, points, residuals, header)
+    point, points = _parse(path)
+    seen = _seen_positions(path, points, header)
     labels, notes = unique_labels(_all_labels(point), seen.shape[1])
     keep = _marker_columns(labels, point)
     if not keep:
@@ -94,8 +94,8 @@ def _bytes_of(path: Path) -> bytes:
         raise InputError(f"{path} cannot be read: {error.strerror}.") from error
 
 
-def _parse(path: Path) -> tuple[Parameters, Array, Array]:
-    """The parameters of POINT, the points (4, M, N) and their residuals (1, M, N), as ezc3d reads them."""
+def _parse(path: Path) -> tuple[Parameters, Array]:
+    """The parameters of POINT and the points (4, M, N), as ezc3d reads them: NaN where the residual is negative."""
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / "take.npz"
         command = [sys.executable, "-P", str(Path(__file__).with_name("c3d_parse.py")), str(path), str(target)]
@@ -107,10 +107,10 @@ def _parse(path: Path) -> tuple[Parameters, Array, Array]:
             reason = run.stderr.strip().rpartition("\n")[2].rstrip(" .") or "it cannot be parsed"
             raise InputError(f"{path} is damaged: {reason}. {AGAIN}")
         with np.load(target, allow_pickle=False) as parsed:
-            return json.loads(parsed["point"].item()), parsed["points"], parsed["residuals"]
+            return json.loads(parsed["point"].item()), parsed["points"]
 
 
-def _seen_positions(path: Path, points: Array, residuals: Array, header: Header) -> Array:
+def _seen_positions(path: Path, points: Array, header: Header) -> Array:
     """(N, M, 3) in the file's unit and axes, NaN where not seen."""
     if points.ndim != 3 or 0 in points.shape:
         raise InputError(f"{path} holds no frames of points; expected a C3D file with markers.")
@@ -118,7 +118,7 @@ def _seen_positions(path: Path, points: Array, residuals: Array, header: Header)
         count = f"it should hold {header.frames} frames, but holds {points.shape[2]}"
         raise InputError(f"{path} is cut short: {count}. Copy it again.")
     positions = points[:3].transpose(2, 1, 0).astype(float, order="C")
-    unseen = ~np.isfinite(positions).all(-1) | (positions == 0).all(-1) | ~(residuals[0].T >= 0)
+    unseen = ~np.isfinite(positions).all(-1) | (positions == 0).all(-1)
     positions[unseen] = np.nan
     return positions
 

@@ -102,6 +102,16 @@ def test_unseen_points_are_nan_and_their_neighbours_are_not(tmp_path: Path) -> N
     np.testing.assert_allclose(clip.positions[~expected], positions[~expected], rtol=1e-6)
 
 
+def test_a_negative_residual_hides_its_point_wherever_that_seems_to_be(tmp_path: Path) -> None:
+    path = write_c3d(tmp_path / "take.c3d", np.arange(1.0, 25).reshape(2, 4, 3), list("abcd"), "m")
+    data = bytearray(path.read_bytes())
+    struct.pack_into("<f", data, (read_header(path, bytes(data)).data_block - 1) * 512 + 12, -1.0)
+    path.write_bytes(data)
+    unseen = np.isnan(read_c3d(path).positions)
+    assert unseen[0, 0].all()
+    assert unseen.sum() == 3
+
+
 def test_more_names_than_one_parameter_holds_are_all_found(tmp_path: Path) -> None:
     labels = [f"marker{i}" for i in range(300)]
     positions = np.random.default_rng(0).uniform(0.1, 1, (2, 300, 3))

@@ -112,16 +112,21 @@ def test_noise_on_the_band_becomes_little_noise_on_the_chin() -> None:
 
 def test_a_band_marker_that_strays_by_20_mm_for_a_while_leaves_the_face_alone() -> None:
     rng = np.random.default_rng(2)
-    rest = band_rest()
+    rest = band_rest().copy()
+    rest[3] = rest[1] + rest[2] - rest[0]  # quite flat, so that no frame alone can tell which marker has left the plane
+    normal = np.cross(rest[1] - rest[0], rest[2] - rest[0])
+    normal /= np.linalg.norm(normal)
     for marker in range(4):
         stage = Stabiliser(rest[:4], range(4))
         for i in range(60):
             T = motion(np.random.default_rng(3), 1, 1)
-            places = apply(T, rest) + rng.normal(size=rest.shape) * 1e-4
+            places = apply(T, rest) + rng.normal(size=rest.shape) * 3e-4
             if 20 <= i < 40:
-                places[marker] += T[:3, :3] @ [0, 0.02, 0]  # out of the band's plane, where least squares cannot tell
+                places[marker] += T[:3, :3] @ (0.02 * normal)
             out = stage(frame(places, i))
-            assert np.linalg.norm(out.positions[4:] - rest[4:], axis=1).max() < 0.002
+            assert (
+                np.linalg.norm(out.positions[4:] - rest[4:], axis=1).max() < 0.004
+            )  # without a memory of the head: 0.032
 
 
 @pytest.mark.parametrize("shown", [2, 1, 0])
