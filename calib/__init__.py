@@ -1,0 +1,1 @@
+"""Offline makers: a performer out of two short takes. Imports `retarget`, never the reverse."""
