@@ -7,6 +7,7 @@ MPEG-4 part 2 (`mp4v`) in 4:2:0, which OpenCV's wheels write everywhere; its fla
 from __future__ import annotations
 
 import math
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Self
 
@@ -58,14 +59,14 @@ class Mp4Sink:
 
     def __enter__(self) -> Self:
         _check_writable(self._path)
-        self._offscreen.__enter__()
-        cv2 = import_module("cv2")
-        self._writer = cv2.VideoWriter(str(self._path), cv2.VideoWriter_fourcc(*"mp4v"), self._fps, self._size)
-        if not self._writer.isOpened():
+        try:
+            self._offscreen.__enter__()
+            self._writer = _open_writer(self._path, self._fps, self._size)
+        except BaseException:
             self._offscreen.close()
-            raise OutputError(
-                f"OpenCV cannot start the video {self._path}; its build on this machine lacks MPEG-4 (mp4v)."
-            )
+            if not self._path.stat().st_size:
+                self._path.unlink()
+            raise
         return self
 
     def __call__(self, pose: Pose) -> None:
@@ -89,6 +90,15 @@ class Mp4Sink:
         held = _pictures_in(self._path)
         if held != self._written:
             raise OutputError(f"The video {self._path} holds {held} of {self._written} pictures; is the disk full?")
+
+
+def _open_writer(path: Path, fps: float, size: tuple[int, int]) -> Any:
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # FFmpeg's own lines on stderr would hide our sentence
+    cv2 = import_module("cv2")
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), fps, size)
+    if not writer.isOpened():
+        raise OutputError(f"OpenCV cannot start the video {path}; its build on this machine lacks MPEG-4 (mp4v).")
+    return writer
 
 
 def _check_writable(path: Path) -> None:

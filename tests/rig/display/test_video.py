@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
-from retarget.errors import InputError, OutputError
+from retarget.errors import DisplayError, InputError, OutputError
 from retarget.rig.display.offscreen import Offscreen
 from retarget.rig.display.video import Mp4Sink
 from retarget.rig.display.view import View
@@ -20,6 +21,19 @@ from tests.rig.display.heads import head_pose, head_rig
 
 VIEW = View(160, 120)
 RIG = head_rig()
+ROOT = Path(__file__).parents[3]
+ENDLESS = """
+import itertools, sys
+from pathlib import Path
+from retarget.rig.display.video import Mp4Sink
+from tests.rig.display.heads import head_pose, head_rig
+from tests.rig.display.test_video import VIEW
+rig = head_rig()
+with Mp4Sink(Path(sys.argv[1]), rig, 30, VIEW) as sink:
+    for i in itertools.count():
+        sink(head_pose(rig, yaw_rad=i / 10, number=i))
+        print(i, flush=True)
+"""
 
 
 def read_back(path: Path) -> tuple[list[np.ndarray], float]:
@@ -54,28 +68,14 @@ def test_every_pose_is_one_picture_at_the_rate_given(tmp_path: Path, fps: float)
 def test_an_interrupted_video_can_be_played(tmp_path: Path) -> None:
     """A process draws until Ctrl-C reaches it, as on the command line."""
     path = tmp_path / "out.mp4"
-    program = (
-        "import sys, itertools\n"
-        "from pathlib import Path\n"
-        "from retarget.rig.display.video import Mp4Sink\n"
-        "from tests.rig.display.heads import head_pose, head_rig\n"
-        "from tests.rig.display.test_video import VIEW\n"
-        "rig = head_rig()\n"
-        "with Mp4Sink(Path(sys.argv[1]), rig, 30, VIEW) as sink:\n"
-        "    for i in itertools.count():\n"
-        "        sink(head_pose(rig, number=i))\n"
-        "        print(i, flush=True)\n"
-    )
-    root = Path(__file__).parents[3]
-    child = subprocess.Popen(
-        [sys.executable, "-c", program, str(path)],
-        cwd=root,
+    with subprocess.Popen(
+        [sys.executable, "-c", ENDLESS, str(path)],
+        cwd=ROOT,
         text=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
-    )
-    assert child.stdout is not None
-    with child:
+    ) as child:
+        assert child.stdout is not None
         while child.stdout.readline().strip() not in ("20", ""):
             pass
         child.send_signal(signal.SIGINT)
@@ -85,21 +85,33 @@ def test_an_interrupted_video_can_be_played(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("egl")
-def test_a_run_without_poses_leaves_no_file_and_says_so(tmp_path: Path) -> None:
-    with pytest.raises(OutputError, match="not one pose"), Mp4Sink(tmp_path / "out.mp4", RIG, 60, VIEW):
+def test_a_full_disk_is_told(tmp_path: Path) -> None:
+    """The system refuses to let the file grow beyond 20 kB."""
+    full = "import resource, signal\nsignal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n" + ENDLESS.replace(
+        "    for", "    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))\n    for"
+    ).replace("itertools.count()", "range(100)")
+    done = subprocess.run(
+        [sys.executable, "-c", full, str(tmp_path / "out.mp4")], cwd=ROOT, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    last_line = done.stderr.strip().splitlines()[-1]
+    assert re.fullmatch(r".*OutputError: The video .* holds 0 of 100 pictures; is the disk full\?", last_line)
+    assert "moov" not in done.stderr
+
+
+@pytest.mark.usefixtures("egl")
+def test_where_nothing_can_be_drawn_no_empty_file_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("EGL_DEVICE_ID", "99")
+    with pytest.raises(DisplayError), Mp4Sink(tmp_path / "out.mp4", RIG, 60, VIEW):
         pass
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.usefixtures("egl")
-def test_a_video_that_lacks_pictures_is_told(tmp_path: Path) -> None:
-    path = tmp_path / "out.mp4"
-    sink = Mp4Sink(path, RIG, 60, VIEW).__enter__()
-    sink(head_pose(RIG))
-    sink._writer.release()
-    path.write_bytes(b"")
-    with pytest.raises(OutputError, match=r"holds 0 of 1 pictures; is the disk full"):
-        sink.__exit__(None, None, None)
+def test_a_run_without_poses_leaves_no_file_and_says_so(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="not one pose"), Mp4Sink(tmp_path / "out.mp4", RIG, 60, VIEW):
+        pass
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
