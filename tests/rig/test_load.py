@@ -35,6 +35,7 @@ max_deg = 30
 [sites]
 noseTip = "noseTip"
 chin = "chin"
+mandibleLeft = "mandible"
 [licence]
 name = "CC0-1.0"
 author = "nobody"
@@ -46,6 +47,7 @@ def face_file() -> GlbFile:
     file = two_joint_file()
     file.node(0, name="noseTip", translation=[0.0, 0.1, 0.2])
     file.node(1, name="chin", translation=[0.0, -0.1, 0.1])
+    file.node(file.node(4, name="fixed"), name="mandible", translation=[0.1, 0.0, 0.0])
     file.node(0, name="eyeLeft", translation=[0.03, 0.2, 0.1])
     neck = file.node(name="neck", translation=[0.0, 0.2, 0.0])
     file.gltf.scenes[0].nodes.remove(0)
@@ -85,11 +87,13 @@ def test_everything_that_rig_toml_says_is_in_the_rig(folder: Path) -> None:
 
 def test_sites_and_jaw_are_placed_in_the_heads_frame(folder: Path) -> None:
     rig = load_rig(str(folder))
-    assert list(rig.sites) == ["noseTip", "chin"]
+    assert list(rig.sites) == ["noseTip", "chin", "mandibleLeft"]
     np.testing.assert_allclose(rig.sites["noseTip"].rest, [0, 0.1, 0.2], atol=1e-7)
     np.testing.assert_allclose(rig.sites["chin"].rest, [0, -0.6, 0.1], atol=1e-7)
     assert not rig.sites["noseTip"].rides_jaw
     assert rig.sites["chin"].rides_jaw
+    assert rig.sites["mandibleLeft"].rides_jaw
+    assert rig.joints.names[rig.joints.parents[rig.sites["mandibleLeft"].joint]] == "chin"
     assert rig.jaw is not None
     np.testing.assert_allclose(rig.jaw.pivot, [0, -0.5, 0], atol=1e-7)
     np.testing.assert_array_equal(rig.jaw.axis, [1, 0, 0])
@@ -159,7 +163,7 @@ def test_a_joint_that_the_mesh_lacks_is_refused_with_its_place_and_the_nearest(f
     assert "'noseTip' in [sites] on line 15 names the joint 'noseTop', which square.glb does not have" in message
     assert "did you mean 'noseTip'?" in message
     assert "'head' in [joints]" in refused(folder, '"head"', '"skull"')
-    assert "'joint' in [jaw]" in refused(folder, '"jaw"', '"mandible"')
+    assert "'joint' in [jaw]" in refused(folder, '"jaw"', '"maxilla"')
 
 
 @pytest.mark.parametrize(

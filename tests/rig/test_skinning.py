@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from retarget.errors import InputError
-from retarget.geometry import apply, inverse, quat_from_axis_angle, quat_multiply, transform
+from retarget.geometry import apply, inverse, quat_from_axis_angle, quat_from_matrix, quat_multiply, transform
 from retarget.rig.skinning import Skin, SkinningMethod
 from tests.rig.tubes import make_pose, make_rig, random_joints, random_pose, random_surface, random_turns, tube
 
@@ -99,6 +99,48 @@ def test_a_shape_moves_only_the_surface_that_has_it() -> None:
     assert np.abs(with_shapes.positions[0] - without.positions[0]).max() > 1e-3
 
 
+def naive_dual(rig: Rig, surface: Surface, pose: Pose) -> Array:
+    """Dual quaternion blending by quaternion products alone, one vertex and one joint at a time (Kavan 2008)."""
+    conjugate = np.array([-1.0, -1.0, -1.0, 1.0])
+    turns: list[Array] = []
+    shifts: list[Array] = []
+    for j, parent in enumerate(rig.joints.parents):
+        q, t = pose.rotations[j], pose.translations[j]
+        if parent >= 0:
+            above = turns[parent]
+            t = shifts[parent] + quat_multiply(quat_multiply(above, [*t, 0]), above * conjugate)[:3]
+            q = quat_multiply(above, q)
+        turns.append(q)
+        shifts.append(t)
+    motions = []
+    for q, t, T_rig_joint in zip(turns, shifts, rig.joints.T_rig_joint, strict=True):
+        real = quat_multiply(q, quat_from_matrix(T_rig_joint[:3, :3]) * conjugate)
+        back = quat_multiply(quat_multiply(real, [*T_rig_joint[:3, 3], 0]), real * conjugate)[:3]
+        motions.append((real, quat_multiply([*(t - back), 0], real) / 2))
+    out = []
+    for v, position in enumerate(surface.positions.astype(float)):
+        shares = np.bincount(surface.joints[v], surface.joint_weights[v])
+        pivot = motions[np.argmax(shares)][0]
+        real, dual = np.zeros(4), np.zeros(4)
+        for joint, weight in enumerate(shares):
+            sign = -1 if motions[joint][0] @ pivot < 0 else 1
+            real, dual = real + sign * weight * motions[joint][0], dual + sign * weight * motions[joint][1]
+        real, dual = real / np.linalg.norm(real), dual / np.linalg.norm(real)
+        shift = 2 * quat_multiply(dual, real * conjugate)[:3]
+        out.append(quat_multiply(quat_multiply(real, [*position, 0]), real * conjugate)[:3] + shift)
+    return np.array(out)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_dual_quaternions_agree_with_a_loop_over_vertices_and_joints(seed: int) -> None:
+    rng, rig = random_rig(seed, surfaces=2)
+    still = np.zeros(len(rig.shape_names))
+    for spread_rad in (0.3, 3.0):
+        pose = replace(random_pose(rng, rig, spread_rad), weights=still)
+        for got, surface in zip(Skin(rig, "dual-quaternion")(pose).positions, rig.surfaces, strict=True):
+            np.testing.assert_allclose(got, naive_dual(rig, surface, pose), atol=3e-6)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_dual_quaternions_move_a_rigid_body_as_linear_skinning_does(seed: int) -> None:
     rng, rig = random_rig(seed)
@@ -160,19 +202,16 @@ def test_a_bent_tube_keeps_more_of_its_volume_by_dual_quaternions() -> None:
     assert abs(dual - rest) < abs(linear - rest) / 2
 
 
-def test_dual_quaternions_take_the_short_way_whatever_the_signs_of_the_turns() -> None:
+@pytest.mark.parametrize("root_deg", [0, 80, 170, 179.9, 190, 300])
+def test_dual_quaternions_take_the_short_way_wherever_the_root_is_turned(root_deg: float) -> None:
     rig = tube()
-    turn = quat_from_axis_angle([1.0, 0.0, 0.0], 0.3)
-    for first in (1, -1):
-        for second in (1, -1):
-            rotations = np.stack([first * rig.joints.rotations[0], second * turn])
-            positions = Skin(rig, "dual-quaternion")(make_pose(rig, rotations=rotations)).positions[0]
-            angle = np.arctan2(positions[:, 2], positions[:, 1]) - np.arctan2(
-                rig.surfaces[0].positions[:, 2], rig.surfaces[0].positions[:, 1]
-            )
-            angle = (angle + np.pi) % (2 * np.pi) - np.pi
-            assert angle.min() > -1e-6
-            assert angle.max() < 0.3 + 1e-6
+    skin = Skin(rig, "dual-quaternion")
+    bend = quat_from_axis_angle([0.0, 0.6, 0.8], 0.7)
+    root = quat_from_axis_angle([0.6, 0.0, 0.8], np.radians(root_deg))
+    upright = skin(make_pose(rig, rotations=np.stack([rig.joints.rotations[0], bend]))).positions[0]
+    for sign in (1, -1):
+        turned = skin(make_pose(rig, rotations=np.stack([sign * root, -sign * bend]))).positions[0]
+        np.testing.assert_allclose(turned, upright @ quat_to_rows(root).T, atol=2e-7)
 
 
 def test_dual_quaternions_are_refused_where_a_bind_matrix_has_scale() -> None:

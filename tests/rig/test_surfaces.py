@@ -414,8 +414,29 @@ def test_nodes_that_form_no_tree_are_refused(tmp_path: Path) -> None:
             read(file.save(tmp_path / "a.glb"))
 
 
+def test_the_last_row_of_a_matrix_is_not_taken_from_the_file(tmp_path: Path) -> None:
+    file = two_joint_file()
+    file.gltf.nodes[0].translation = None
+    file.gltf.nodes[0].matrix = [1.0, 0.0, 0.0, 0.5, 0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 1.0, 0.5, 0.0, 1.0, 0.0, 7.0]
+    joints, _, _ = read(file.save(tmp_path / "a.glb"))
+    np.testing.assert_allclose(joints.translations, [[0.0, 1.0, 0.0], [0.0, -0.5, 0.0]], atol=1e-7)
+
+
 def test_two_joints_of_one_name_are_refused(tmp_path: Path) -> None:
     file = two_joint_file()
     file.gltf.nodes[1].name = "head"
     with pytest.raises(InputError, match="two joints named 'head'"):
         read(file.save(tmp_path / "a.glb"))
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e30, "1", True])
+@pytest.mark.parametrize("key", ["translation", "rotation", "scale", "matrix"])
+def test_transforms_that_are_not_finite_numbers_are_refused_with_their_place(
+    key: str, value: object, tmp_path: Path
+) -> None:
+    whole = two_joint_file().save(tmp_path / "a.glb").read_bytes()
+    count = {"translation": 3, "rotation": 4, "scale": 3, "matrix": 16}[key]
+    spoilt = rewrite_json(whole, lambda document: document["nodes"][1].update({key: [0.5] * (count - 1) + [value]}))
+    (tmp_path / "a.glb").write_bytes(spoilt)
+    with pytest.raises(InputError, match=rf"nodes\[1\]: '{key}' should be {count} numbers"):
+        read(tmp_path / "a.glb")
