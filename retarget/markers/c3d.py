@@ -10,6 +10,7 @@ Guide (c3d.org).
 from __future__ import annotations
 
 import json
+import logging
 import math
 import subprocess
 import sys
@@ -21,7 +22,7 @@ import numpy as np
 
 from retarget.errors import InputError
 from retarget.frames import MarkerLayout
-from retarget.markers.c3d_header import AGAIN, Header, read_header
+from retarget.markers.c3d_header import AGAIN, BLOCK, Header, read_header
 from retarget.markers.clip import MarkerClip
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Parameters = Mapping[str, Sequence[Any]]
 
+log = logging.getLogger("retarget.markers")
+
 METRES = {
     "mm": 1e-3, "millimeter": 1e-3, "millimeters": 1e-3, "millimetre": 1e-3, "millimetres": 1e-3,
     "cm": 1e-2, "centimeter": 1e-2, "centimeters": 1e-2, "centimetre": 1e-2, "centimetres": 1e-2,
@@ -40,6 +43,8 @@ METRES = {
 }  # fmt: skip
 MAX_FILE_BYTES = 2_000_000_000
 PARSE_SECONDS = 120
+MOST_FRAMES = 0xFFFF
+"""Where the frame numbers of a C3D header end."""
 NOT_MARKERS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS")
 """Parameters of POINT that list the names of points which are not places."""
 
@@ -50,10 +55,14 @@ def read_c3d(path: Path) -> MarkerClip:
     InputError where there is no such file, or it is no C3D file, damaged, cut short, without markers or in an unknown
     unit.
     """
-    header = read_header(path, _bytes_of(path))
+    data = _bytes_of(path)
+    header = read_header(path, data)
     point, points = _parse(path)
     seen = _seen_positions(path, points, header)
     labels, notes = unique_labels(_all_labels(point), seen.shape[1])
+    notes += _frames_beyond(header, len(data), len(seen))
+    for note in notes:
+        log.warning("%s: %s", path.name, note)
     keep = _marker_columns(labels, point)
     if not keep:
         raise InputError(f"{path} holds no markers, only computed values such as joint angles.")
@@ -121,6 +130,14 @@ def _seen_positions(path: Path, points: Array, header: Header) -> Array:
     unseen = ~np.isfinite(positions).all(-1) | (positions == 0).all(-1)
     positions[unseen] = np.nan
     return positions
+
+
+def _frames_beyond(header: Header, file_bytes: int, frames: int) -> tuple[str, ...]:
+    """A sentence where the file goes on after the last frame that the library reads."""
+    left = file_bytes - (header.data_block - 1) * BLOCK - frames * header.frame_bytes
+    if frames < MOST_FRAMES or left < max(BLOCK, header.frame_bytes):
+        return ()
+    return (f"The take goes on after frame {frames - 1}, but no more are read; export it in shorter pieces.",)
 
 
 def _all_labels(point: Parameters) -> list[str]:

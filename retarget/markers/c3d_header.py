@@ -43,7 +43,7 @@ class Header:
 
     @property
     def frames(self) -> int:
-        """How many frames the header promises; longer takes than 65,535 frames say so elsewhere."""
+        """How many frames the header promises; it cannot count beyond 65,535."""
         return self.last_frame - self.first_frame + 1
 
 

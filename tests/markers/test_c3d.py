@@ -126,6 +126,17 @@ def test_equal_and_empty_names_are_made_unique_and_noted() -> None:
     assert [note.split(" is ")[0] for note in notes] == ["Point 2", "Point 3", "Point 5"]
 
 
+def test_a_take_longer_than_the_header_can_count_is_read_so_far_and_noted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for frames, noted in ((65_535, 0), (65_600, 1)):
+        positions = np.arange(1.0, frames + 1)[:, None, None] * np.ones(3)
+        clip = read_c3d(write_c3d(tmp_path / "take.c3d", positions, ["a"], "m"))
+        assert clip.positions[-1, 0, 0] == len(clip) == 65_535
+        assert len(clip.notes) == len(caplog.records) == noted
+    assert "goes on after frame 65534" in caplog.text
+
+
 def test_up_is_taken_from_the_file_only_where_both_screen_axes_make_sense(tmp_path: Path) -> None:
     positions = np.tile([1.0, 2.0, 3.0], (2, 1, 1))
     turned = {("+X", "+Z"): [1, 3, -2], ("-Y", "+Z"): [-2, 3, -1], ("+Z", "-X"): [3, -1, -2], ("X", "Y"): [1, 2, 3]}
