@@ -23,7 +23,7 @@ REACH_M = 0.030
 """Skin farther than this from every site, along the surface, keeps MakeHuman's weights."""
 LIP_M = 0.009
 """How far from the line between the lips the inside of the mouth follows them."""
-LID_M = 0.006
+LID_M = 0.014
 """How far behind its edge the inside of a lid follows it."""
 FLESH_M = 0.016
 """A lip or a lid reaches this far from its joints."""
@@ -103,16 +103,25 @@ def _given(
     far = surface_distance(positions, triangles, vertices) > REACH_M
     for inside, depth in ((regions.mouth, LIP_M), (regions.sockets, LID_M)):
         far |= inside & (surface_distance(positions, triangles, np.flatnonzero(~inside)) > depth)
+    jaw = np.where(regions.mouth, _jaw_share(positions, triangles, sites), bones.jaw)
     given[far] = 0
-    given[far, -1] = bones.jaw[far]
-    given[far, -2] = 1 - bones.jaw[far]
+    given[far, -1] = jaw[far]
+    given[far, -2] = 1 - jaw[far]
     given[vertices] = np.eye(len(sites), len(sites) + 2)
     return given
 
 
-def _bounds(
+def _jaw_share(
     positions: NDArray[np.float64], triangles: NDArray[np.intp], sites: dict[str, int]
 ) -> NDArray[np.float64]:
+    """(V,) for the inside of the mouth: the floor follows the jaw, the palate the skull, the cheeks lie between."""
+    to_upper = surface_distance(positions, triangles, _named(sites, "lipUpper"))
+    to_lower = surface_distance(positions, triangles, _named(sites, "lipLower"))
+    share = np.clip((to_upper / (to_upper + to_lower) - 0.5) * 5 + 0.5, 0, 1)
+    return np.asarray(share * share * (3 - 2 * share))
+
+
+def _bounds(positions: NDArray[np.float64], triangles: NDArray[np.intp], sites: dict[str, int]) -> NDArray[np.float64]:
     """(V, S + 2): 0 where a joint must not reach, 1 elsewhere."""
     names = (*sites, HEAD, JAW)
     bound = np.ones((len(positions), len(names)))

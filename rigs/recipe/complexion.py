@@ -30,12 +30,19 @@ SOCKET = (150.0, 84.0, 78.0)
 GULLET = (44.0, 12.0, 14.0)
 GUMS = (150.0, 74.0, 74.0)
 
-BROW_LINE_M = ((0.0125, 0.0150), (0.0180, 0.0178), (0.0260, 0.0208), (0.0340, 0.0222), (0.0410, 0.0198), (0.0465, 0.0150))
+BROW_LINE_M = (
+    (0.0125, 0.0150),
+    (0.0180, 0.0178),
+    (0.0260, 0.0208),
+    (0.0340, 0.0222),
+    (0.0410, 0.0198),
+    (0.0465, 0.0150),
+)
 """(x, y) of the left brow's middle line, from the nose outwards."""
-BROW_HALF_MM = (3.0, 3.6, 3.5, 2.9, 1.9, 0.5)
+BROW_HALF_MM = (3.4, 4.0, 3.9, 3.3, 2.3, 0.8)
 HAIR_LINE_DEG_M = (
     # (angle about the vertical through the skull, height of the hairline): front, temple, whiskers, above the ear, nape
-    (0, 0.064), (15, 0.066), (30, 0.067), (42, 0.060), (52, 0.046), (58, 0.038), (64, 0.030), (69, 0.010), (74, -0.014),
+    (0, 0.0625), (12, 0.0635), (24, 0.068), (34, 0.067), (44, 0.057), (52, 0.044), (58, 0.038), (64, 0.030), (69, 0.010), (74, -0.014),
     (84, -0.016), (92, -0.010), (112, -0.012), (125, -0.030), (150, -0.052), (180, -0.058),
 )  # fmt: skip
 SKULL_BEHIND_M = 0.075
@@ -101,14 +108,14 @@ def _flush(skin: Field, ground: Ground, spots: dict[str, Field]) -> Field:
     redness += 0.40 * _near(ground, spots["noseTip"] + [0, -0.002, -0.004], (12, 11, 16))
     redness += 0.20 * _near(ground, spots["noseWingLeft"], (7, 8, 10))
     redness += 0.20 * _near(ground, spots["chin"], (14, 10, 16))
-    redness += 0.45 * _ears(ground)
+    redness += 0.45 * _ears(ground.source_uv)
     redness += 0.10 * _near(ground, spots["forehead"], (40, 18, 30))
     pale = 0.10 * _near(ground, spots["browCenter"] + [0, 0.012, 0], (22, 14, 20))
     return blend(blend(skin, FLUSH, redness * patchy), (226, 186, 158), pale)
 
 
-def _ears(ground: Ground) -> Field:
-    away = np.min([np.linalg.norm(ground.source_uv - middle, axis=1) for middle in EAR_UV], axis=0)
+def _ears(source_uv: Field) -> Field:
+    away = np.min([np.linalg.norm(source_uv - middle, axis=1) for middle in EAR_UV], axis=0)
     return smoothstep(0.030, 0.020, away)
 
 
@@ -133,18 +140,23 @@ def _lips(skin: Field, ground: Ground) -> Field:
     return blend(skin, colour, 0.92 * softness)
 
 
-def _hairline(ground: Ground) -> Field:
-    """(N,) [m] how far above the hairline, negative on bare skin."""
-    x, y, z = ground.place.T
+def _above_hairline(place: Field) -> Field:
+    """(N,) [m], negative on bare skin."""
+    x, y, z = place.T
     angle = np.degrees(np.arctan2(np.abs(x), z + SKULL_BEHIND_M))
     line = np.array(HAIR_LINE_DEG_M, dtype=float)
-    return y - np.interp(angle, line[:, 0], line[:, 1])
+    return np.asarray(y - np.interp(angle, line[:, 0], line[:, 1]))
+
+
+def hair_cover(place: Field, source_uv: Field) -> Field:
+    """(N,) 1 where the hair of the head grows, 0 on bare skin, for places (N, 3) [m] from the middle between the eyes."""
+    return smoothstep(0.0, 0.022, _above_hairline(place)) * (1 - _ears(source_uv))
 
 
 def _hair(skin: Field, ground: Ground) -> Field:
     place = ground.place * 1e3
-    above = _hairline(ground) * 1e3 + 3.0 * fractal(place, 9, 3, seed=71) + 1.6 * value_noise(place, 0.7, seed=75)
-    cover = smoothstep(-2.0, 7.0, above) * (1 - _ears(ground))
+    above = _above_hairline(ground.place) * 1e3 + 4.0 * fractal(place, 10, 3, seed=71) + 3.0 * value_noise(place, 0.8, seed=75)
+    cover = smoothstep(-3.0, 11.0, above) * (1 - _ears(ground.source_uv))
     strands = 0.55 * value_noise(place * [1, 0.35, 1], 0.8, seed=81) + 0.45 * value_noise(place, 1.9, seed=82)
     light = 1 + 0.30 * strands + 0.12 * fractal(place, 25, 2, seed=83)
     return blend(skin, np.array(HAIR) * light[:, None], 0.93 * cover)
@@ -154,7 +166,10 @@ def _brows(skin: Field, ground: Ground) -> Field:
     line = np.array(BROW_LINE_M) * 1e3
     steps = np.linspace(0, len(line) - 1, 200)
     middle = np.stack([np.interp(steps, np.arange(len(line)), line[:, k]) for k in range(2)], axis=1)
-    middle = np.stack([np.convolve(np.pad(row, 12, "reflect", reflect_type="odd"), np.ones(25) / 25, "valid") for row in middle.T], axis=1)
+    middle = np.stack(
+        [np.convolve(np.pad(row, 12, "reflect", reflect_type="odd"), np.ones(25) / 25, "valid") for row in middle.T],
+        axis=1,
+    )
     run = np.r_[0, np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))]
     half = np.interp(steps, np.arange(len(line)), BROW_HALF_MM)
     x, y = np.abs(ground.place[:, 0]) * 1e3, ground.place[:, 1] * 1e3
@@ -167,12 +182,15 @@ def _brows(skin: Field, ground: Ground) -> Field:
     length = run[-1]
     lean = np.radians(np.interp(along / length, [0, 0.25, 0.6, 1], [62, 34, 14, -8]))
     side = np.where(ground.place[:, 0] > 0, 0.0, 40.0)
-    strand = np.stack([across * np.cos(lean) - along * np.sin(lean), (along * np.cos(lean) + across * np.sin(lean)) * 0.13, side], axis=1)
-    hairs = value_noise(strand, 0.42, seed=91) * 0.7 + value_noise(strand, 0.8, seed=92) * 0.4
+    strand = np.stack(
+        [across * np.cos(lean) - along * np.sin(lean), (along * np.cos(lean) + across * np.sin(lean)) * 0.13, side],
+        axis=1,
+    )
+    hairs = value_noise(strand, 0.40, seed=91) * 0.6 + value_noise(strand, 0.75, seed=92) * 0.4
     depth = 1 - np.abs(across) / half[nearest]
     ends = smoothstep(-1.5, 4.0, along) * smoothstep(length + 1.5, length - 6, along)
-    body = smoothstep(-0.35, 0.75, depth + 0.55 * hairs) * ends
-    cover = body * (0.62 + 0.38 * smoothstep(-0.5, 0.5, hairs)) * ground.brows
+    body = smoothstep(-0.45, 0.55, depth + 0.55 * hairs) * ends
+    cover = body * (0.72 + 0.28 * smoothstep(-0.5, 0.5, hairs)) * ground.brows
     return blend(skin, np.array(BROW) * (1 + 0.2 * hairs)[:, None], 0.88 * cover)
 
 

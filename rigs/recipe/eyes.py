@@ -48,7 +48,9 @@ def eyeball(name: str, helper: NDArray[np.float64], moved: Mapping[str, NDArray[
     for shape, target in moved.items():
         R = kabsch(helper - centre, target - centre)[:3, :3]
         shapes[shape] = (positions - centre) @ R.T + centre - positions
-    return Part(name, positions, vertex_normals(positions, triangles), uv, triangles, *rigid(len(positions), joint), shapes)
+    return Part(
+        name, positions, vertex_normals(positions, triangles), uv, triangles, *rigid(len(positions), joint), shapes
+    )
 
 
 def _directions() -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -112,7 +112,12 @@ def write_glb(
     writer = _Writer(document)
     primitives = [_primitive(writer, part, number, shapes) for number, part in enumerate(parts)]
     document["meshes"].append(
-        {"name": name, "primitives": primitives, "weights": [0.0] * len(shapes), "extras": {"targetNames": list(shapes)}}
+        {
+            "name": name,
+            "primitives": primitives,
+            "weights": [0.0] * len(shapes),
+            "extras": {"targetNames": list(shapes)},
+        }
     )
     for part, look in zip(parts, looks, strict=True):
         _material(writer, part.name, look)

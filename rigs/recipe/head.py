@@ -10,8 +10,8 @@ import numpy as np
 from retarget.geometry import apply, kabsch
 from rigs.recipe import pictures
 from rigs.recipe.atlas import ISLANDS, island_of, pack
-from rigs.recipe.binding import HEAD, INFLUENCES, JAW, NECK, Binding, Bones, Regions, bind_skin, gather
-from rigs.recipe.complexion import Ground, complexion
+from rigs.recipe.binding import HEAD, JAW, NECK, Binding, Bones, Regions, bind_skin, gather
+from rigs.recipe.complexion import Ground, complexion, hair_cover
 from rigs.recipe.eyes import eyeball, fit_sphere
 from rigs.recipe.glb import Look, Skeleton, write_glb
 from rigs.recipe.identity import person
@@ -19,10 +19,11 @@ from rigs.recipe.lashes import hairs, strip_grid
 from rigs.recipe.mouth import LOWER, UPPER, teeth, tongue
 from rigs.recipe.occlusion import openness, smooth
 from rigs.recipe.paint import Canvas, canvas, jpeg, look_up, png
-from rigs.recipe.part import Part, join, rigid, vertex_normals
-from rigs.recipe.shapes import ARKIT
+from rigs.recipe.part import Part, join, vertex_normals
+from rigs.recipe.refine import refine, thicken
+from rigs.recipe.shapes import ARKIT, iron, looseness
 from rigs.recipe.sites import LEFT, MIDDLE, rides_jaw
-from rigs.recipe.skin import Skin, cut_head, triangulate
+from rigs.recipe.skin import Skin, close, cut_head, triangulate
 from rigs.recipe.weights import surface_distance
 
 if TYPE_CHECKING:
@@ -36,6 +37,10 @@ HEAD_FROM_EYES_M = (0.0, -0.037, -0.078)
 NECK_FROM_EYES_M = (0.0, -0.108, -0.095)
 CUT_ABOVE_NECK_M = 0.010
 CUT_TILT_DEG = 18.0
+SPLITS, LONGEST_EDGE_M = 2, 0.014
+HAIR_M = 0.0035
+LIPS_UP_M = (0.0009, -0.0002)
+"""How far the lower and the upper lip move to shut the mouth."""
 SKIN_SIZE, SKIN_QUALITY = 1024, 90
 LASH = (34, 25, 21)
 EYES = {"eyeLeft": "helper-l-eye", "eyeRight": "helper-r-eye"}
@@ -48,25 +53,31 @@ def build(wheel: Wheel) -> bytes:
     base = person(wheel, mesh)
     units = {name: wheel.face_unit(name, count) for name in ARKIT}
     body = mesh.groups == "body"
-    skin = cut_head(base, mesh.quads[body], mesh.uv[mesh.quad_uv[body]], _cut_plane(mesh, base))
+    plane = _cut_plane(mesh, base)
+    skin = cut_head(base, mesh.quads[body], mesh.uv[mesh.quad_uv[body]], plane)
+    for _ in range(SPLITS):
+        skin = refine(skin, base, LONGEST_EDGE_M)
+    skin = close(skin, base, plane[1])
+    skin = _grow_hair(skin, base, eyes_of(mesh, base).mean(0))
     lowest = skin.positions(base)[:, 1].min()
-    eyes = np.array([fit_sphere(base[_exact_group(mesh, group)])[0] for group in EYES.values()])
-    base -= [0.0, lowest, eyes[0, 2] + HEAD_FROM_EYES_M[2]]
-    positions = skin.positions(base)
+    base -= [0.0, lowest, eyes_of(mesh, base)[0, 2] + HEAD_FROM_EYES_M[2]]
     sites = _sites(skin, wheel.mirror(count))
-    skeleton = _skeleton(mesh, base, {name: positions[vertex] for name, vertex in sites.items()})
     bones = gather(wheel.bone_weights(count))
     lifted = Bones(*(skin.lift @ row for row in (bones.head, bones.jaw, bones.neck)))
-    binding = bind_skin(positions, skin.triangles, sites, lifted, _regions(skin))
+    binding = bind_skin(skin.positions(base), skin.triangles, sites, lifted, _regions(skin))
+    skin = _close_lips(skin, binding)
+    positions = skin.positions(base)
+    skeleton = _skeleton(mesh, base, {name: positions[vertex] for name, vertex in sites.items()})
+    lip_mask = wheel.lip_mask()
     parts = [
-        _skin_part(skin, base, binding, skeleton, units),
+        _skin_part(skin, base, binding, skeleton, units, _firm(skin, sites, lip_mask)),
         _eyes_part(mesh, base, skeleton, units),
         _mouth_part(mesh, base, skeleton, units),
         _lashes_part(mesh, base, skin, binding, skeleton, units),
     ]
     spots = {name: positions[vertex] - eye_middle(skeleton) for name, vertex in sites.items()}
     layer = canvas(pack(skin.uv), SKIN_SIZE)
-    ground = _ground(layer, skin, positions - eye_middle(skeleton), wheel.lip_mask())
+    ground = _ground(layer, skin, positions - eye_middle(skeleton), lip_mask)
     looks = [
         Look(jpeg(layer.picture(complexion(ground, spots)), SKIN_QUALITY), 0.62),
         Look(jpeg(pictures.eye(), 92), 0.12),
@@ -113,6 +124,25 @@ def _cut_plane(mesh: BaseMesh, base: NDArray[np.float64]) -> tuple[NDArray[np.fl
     return point, np.array([0.0, np.cos(tilt), np.sin(tilt)])
 
 
+def eyes_of(mesh: BaseMesh, base: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centres (2, 3) [m] of the eyeballs, left and right."""
+    return np.array([fit_sphere(base[_exact_group(mesh, group)])[0] for group in EYES.values()])
+
+
+def _grow_hair(skin: Skin, base: NDArray[np.float64], eyes: NDArray[np.float64]) -> Skin:
+    source_uv = np.zeros((skin.lift.shape[0], 2))
+    source_uv[skin.triangles] = skin.uv
+    return thicken(skin, base, HAIR_M * hair_cover(skin.positions(base) - eyes, source_uv))
+
+
+def _close_lips(skin: Skin, binding: Binding) -> Skin:
+    """Raise the lower lip and lower the upper one by a hair, as far as they follow their joints."""
+    raised = sum(binding.weights[:, k] for k, name in enumerate(binding.names) if name.startswith("lipLower"))
+    lowered = sum(binding.weights[:, k] for k, name in enumerate(binding.names) if name.startswith("lipUpper"))
+    up = LIPS_UP_M[0] * np.asarray(raised) + LIPS_UP_M[1] * np.asarray(lowered)
+    return replace(skin, offset=skin.offset + up[:, None] * [0.0, 1.0, 0.0])
+
+
 def _sites(skin: Skin, mirror: NDArray[np.intp]) -> dict[str, int]:
     """The skin vertex of every site."""
     lift = skin.lift.tocoo()
@@ -126,7 +156,7 @@ def _sites(skin: Skin, mirror: NDArray[np.intp]) -> dict[str, int]:
 
 
 def _skeleton(mesh: BaseMesh, base: NDArray[np.float64], sites: dict[str, NDArray[np.float64]]) -> Skeleton:
-    eyes = {name: fit_sphere(base[_exact_group(mesh, group)])[0] for name, group in EYES.items()}
+    eyes = dict(zip(EYES, eyes_of(mesh, base), strict=True))
     middle = np.mean(list(eyes.values()), axis=0)
     places = {
         NECK: middle + NECK_FROM_EYES_M,
@@ -138,6 +168,15 @@ def _skeleton(mesh: BaseMesh, base: NDArray[np.float64], sites: dict[str, NDArra
     names = tuple(places)
     parents = {NECK: -1, HEAD: 0} | {site: names.index(JAW) for site in sites if rides_jaw(site)}
     return Skeleton(names, tuple(parents.get(name, 1) for name in names), np.array(list(places.values())))
+
+
+def _firm(skin: Skin, sites: dict[str, int], lip_mask: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Vertices about which the shapes keep their detail: the red of the lips, the mouth, the sockets, nose and brows."""
+    red = look_up(lip_mask, skin.uv.reshape(-1, 2)) > 0.5
+    regions = _regions(skin)
+    inside = np.flatnonzero(regions.mouth | regions.sockets)
+    fine = [vertex for name, vertex in sites.items() if name.startswith(("lip", "lid", "eye", "nose", "brow"))]
+    return np.unique(np.concatenate([skin.triangles.ravel()[red], inside, fine]))
 
 
 def _regions(skin: Skin) -> Regions:
@@ -157,6 +196,7 @@ def _skin_part(
     binding: Binding,
     skeleton: Skeleton,
     units: dict[str, NDArray[np.float64]],
+    firm: NDArray[np.intp],
 ) -> Part:
     """The skin with a vertex for every (place, texture coordinate) pair."""
     positions = skin.positions(base)
@@ -165,9 +205,17 @@ def _skin_part(
     unique, index = np.unique(corners, axis=0, return_inverse=True)
     vertex = unique[:, 0].astype(int)
     joints, weights = _rig_influences(binding, skeleton)
-    shapes = {name: (skin.lift @ offsets)[vertex] for name, offsets in units.items()}
+    loose = looseness(positions, skin.triangles, firm)
+    shapes = {name: iron(skin.lift @ offsets, skin.triangles, loose)[vertex] for name, offsets in units.items()}
     return Part(
-        "skin", positions[vertex], normals[vertex], unique[:, 1:], index.reshape(-1, 3), joints[vertex], weights[vertex], shapes
+        "skin",
+        positions[vertex],
+        normals[vertex],
+        unique[:, 1:],
+        index.reshape(-1, 3),
+        joints[vertex],
+        weights[vertex],
+        shapes,
     )
 
 
@@ -183,7 +231,9 @@ def _eyes_part(
     parts = []
     for name, group in EYES.items():
         vertices = _exact_group(mesh, group)
-        moved = {shape: base[vertices] + offsets[vertices] for shape, offsets in units.items() if offsets[vertices].any()}
+        moved = {
+            shape: base[vertices] + offsets[vertices] for shape, offsets in units.items() if offsets[vertices].any()
+        }
         parts.append(eyeball(name, base[vertices], moved, skeleton.names.index(name)))
     return join("eyes", parts)
 
@@ -197,7 +247,9 @@ def _mouth_part(
     front = base[helpers["upper"]].max(0)[2] - 0.0004
     top = teeth("upperTeeth", UPPER, np.array([0.0, edge, front]), head)
     bottom = teeth("lowerTeeth", LOWER, np.array([0.0, edge + 0.0012, front - 0.0026]), jaw)
-    bottom = _follow(bottom, base[helpers["lower"]], {name: offsets[helpers["lower"]] for name, offsets in units.items()})
+    bottom = _follow(
+        bottom, base[helpers["lower"]], {name: offsets[helpers["lower"]] for name, offsets in units.items()}
+    )
     vertices = _exact_group(mesh, "helper-tongue")
     quads = np.searchsorted(vertices, mesh.quads[mesh.groups == "helper-tongue"])
     at = base[vertices]

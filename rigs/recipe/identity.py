@@ -16,7 +16,14 @@ if TYPE_CHECKING:
 
 MALE = 0.3
 ORIGINS = {"african": 0.2, "asian": 0.25, "caucasian": 0.55}
-DETAILS: dict[str, float] = {}
+DETAILS = {
+    "eyes/l-eye-scale-incr": 0.45,
+    "eyes/r-eye-scale-incr": 0.45,
+    "eyes/l-eye-height2-incr": 0.25,
+    "eyes/r-eye-height2-incr": 0.25,
+    "mouth/mouth-scale-vert-decr": 0.15,
+    "head/head-oval": 0.25,
+}
 """Single features, by target name."""
 
 
@@ -35,7 +42,5 @@ def _macro() -> dict[str, float]:
         for origin, share in ORIGINS.items()
         for sex, part in sexes.items()
     }
-    build = {
-        f"macrodetails/universal-{sex}-young-averagemuscle-averageweight": part for sex, part in sexes.items()
-    }
+    build = {f"macrodetails/universal-{sex}-young-averagemuscle-averageweight": part for sex, part in sexes.items()}
     return targets | build

@@ -34,6 +34,8 @@ class Arch:
 UPPER = Arch((8.4, 6.6, 7.6, 7.0, 6.6, 10.0, 9.5), (10.0, 8.8, 9.8, 8.4, 8.0, 7.4, 7.0), 0.0275, 0.044, 1)
 LOWER = Arch((5.4, 5.9, 6.8, 7.0, 7.0, 11.0, 10.5), (8.6, 9.0, 10.0, 8.4, 8.0, 7.4, 7.0), 0.0255, 0.042, -1)
 
+TONGUE_SCALE = (0.92, 0.66, 0.94)
+TONGUE_SHIFT_M = (0.0, -0.0005, -0.002)
 CREST = 0.34
 """Texture row where the gum ends."""
 _ROWS = (
@@ -109,7 +111,9 @@ def picture_edges() -> NDArray[np.float64]:
 def tongue(
     positions: NDArray[np.float64], triangles: NDArray[np.intp], joint: int, shapes: dict[str, NDArray[np.float64]]
 ) -> Part:
-    """The tongue (V, 3) [m], root at the back, with its share of the picture."""
+    """The tongue (V, 3) [m], root at the back, with its share of the picture; lies flatter than MakeHuman's."""
+    root = np.array([0.0, positions[:, 1].min(), positions[:, 2].min()])
+    positions = root + (positions - root) * TONGUE_SCALE + TONGUE_SHIFT_M
     low, high = positions.min(0), positions.max(0)
     unit = (positions - low) / (high - low)
     uv = np.stack([unit[:, 2], 0.52 + 0.46 * unit[:, 0]], axis=1)

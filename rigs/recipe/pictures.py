@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 EYE_SIZE = 512
 MOUTH_SIZE = 512
-WHITE = (226.0, 219.0, 212.0)
+WHITE = (208.0, 201.0, 195.0)
 VEINS = (196.0, 128.0, 118.0)
 IRIS_OUTER = (62.0, 74.0, 78.0)
 IRIS_INNER = (128.0, 104.0, 70.0)
@@ -48,8 +48,9 @@ def _sclera(x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.fl
     turn = np.arctan2(y, x)
     thread = np.abs(fractal(np.stack([turn * 7, angle * 0.03, np.zeros_like(x)], axis=1) + 0.4 * place, 1.0, 3, seed=5))
     colour = blend(colour, VEINS, 0.35 * smoothstep(0.06, 0.0, thread) * smoothstep(34, 70, angle))
-    shadow = smoothstep(0.02, 0.42, y) * 0.34
-    return colour * (1 - shadow)[:, None]
+    above = 0.30 * smoothstep(0.02, 0.42, y)
+    aside = 0.34 * smoothstep(26, 58, angle)
+    return np.asarray(colour * ((1 - above) * (1 - aside))[:, None])
 
 
 def _iris(
@@ -63,7 +64,10 @@ def _iris(
     inner = smoothstep(0.78, 0.36, reach + 0.12 * fibres)
     shade = np.array(IRIS_OUTER) + inner[:, None] * (np.array(IRIS_INNER) - IRIS_OUTER)
     shade = shade * (1.12 + 0.38 * fibres)[:, None]
-    shade = shade * (1 - 0.62 * smoothstep(0.82, 1.0, reach) - 0.30 * smoothstep(0.1, 0.9, y * RINGS_DEG[-1] / IRIS_DEG))[:, None]
+    shade = (
+        shade
+        * (1 - 0.62 * smoothstep(0.82, 1.0, reach) - 0.30 * smoothstep(0.1, 0.9, y * RINGS_DEG[-1] / IRIS_DEG))[:, None]
+    )
     colour = blend(colour, shade, smoothstep(1.06, 0.97, reach))
     return blend(colour, PUPIL, smoothstep(0.43, 0.37, reach + 0.015 * fibres))
 

@@ -55,7 +55,7 @@ def cut_head(
     corner_uv: NDArray[np.float64],
     plane: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Skin:
-    """The part of the mesh on the positive side of `plane` (point, unit normal) that holds the highest vertex, closed below."""
+    """The part of the mesh on the positive side of `plane` (point, unit normal) that holds the highest vertex, open below."""
     split = triangulate(quads, vertices)
     triangles = np.take_along_axis(quads[:, None, :], split, axis=2).reshape(-1, 3)
     uv = corner_uv[np.arange(len(quads))[:, None, None], split].reshape(-1, 3, 2)
@@ -66,7 +66,7 @@ def cut_head(
     cut = _Cut(np.where(near, 0.0, side))
     for triangle, corners in zip(triangles, uv, strict=True):
         cut.add(triangle, corners)
-    return _close(_compact(cut, vertices, offset), vertices, normal)
+    return _compact(cut, vertices, offset)
 
 
 class _Cut:
@@ -113,7 +113,9 @@ def _compact(cut: _Cut, vertices: NDArray[np.float64], offset: NDArray[np.float6
     triangles, uv, lift = np.array(cut.triangles), np.array(cut.uv), cut.lift()
     count = lift.shape[0]
     offset = np.vstack([offset, np.zeros((count - len(offset), 3))])
-    edges = sparse.coo_array((np.ones(triangles.size), (triangles.ravel(), np.roll(triangles, 1, 1).ravel())), (count, count))
+    edges = sparse.coo_array(
+        (np.ones(triangles.size), (triangles.ravel(), np.roll(triangles, 1, 1).ravel())), (count, count)
+    )
     piece = csgraph.connected_components(edges, directed=False)[1]
     top = triangles.ravel()[np.argmax(vertices[np.minimum(triangles.ravel(), len(vertices) - 1), 1])]
     kept = piece[triangles[:, 0]] == piece[top]
@@ -140,7 +142,7 @@ def _loop(edges: NDArray[np.intp]) -> NDArray[np.intp]:
     return np.array(loop)
 
 
-def _close(skin: Skin, vertices: NDArray[np.float64], normal: NDArray[np.float64]) -> Skin:
+def close(skin: Skin, vertices: NDArray[np.float64], normal: NDArray[np.float64]) -> Skin:
     """Add the rings below the rim, each a copy of the rim moved inwards and down, and one vertex in the middle."""
     rim = skin.rim
     at = skin.positions(vertices)
@@ -156,7 +158,7 @@ def _close(skin: Skin, vertices: NDArray[np.float64], normal: NDArray[np.float64
         triangles.append(_band(previous, ring))
         previous, count = ring, count + size
     triangles.append(np.stack([np.roll(previous, -1), previous, np.full(size, count)], axis=1))
-    offsets.append((centre - BASE_RINGS_M[-1][0] * normal - skin.lift[rim[:1]] @ vertices))
+    offsets.append(centre - BASE_RINGS_M[-1][0] * normal - skin.lift[rim[:1]] @ vertices)
     lift = sparse.vstack([skin.lift, *[skin.lift[rim]] * len(BASE_RINGS_M), skin.lift[rim[:1]]], format="csr")
     rim_uv = _rim_uv(skin)
     base_uv = np.concatenate([np.tile(rim_uv[:, [1, 0, 0]], (1, 1, 1)), rim_uv[:, [1, 0, 1]]], axis=1).reshape(-1, 3, 2)

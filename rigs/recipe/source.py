@@ -125,6 +125,4 @@ def _parse_obj(lines: Iterable[str]) -> BaseMesh:
             corners.append([[int(number) - 1 for number in field.split("/")[:2]] for field in fields])
             groups.append(group)
     quads = np.array(corners, dtype=np.intp)
-    return BaseMesh(
-        np.array(vertices) * METRES_PER_UNIT, np.array(uv), quads[..., 0], quads[..., 1], np.array(groups)
-    )
+    return BaseMesh(np.array(vertices) * METRES_PER_UNIT, np.array(uv), quads[..., 0], quads[..., 1], np.array(groups))
