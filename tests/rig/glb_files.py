@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import json
 import struct
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pygltflib as g
 
+from retarget.rig.glb import read_glb
+from retarget.rig.nodes import read_nodes, read_skeleton
+from retarget.rig.surfaces import read_surfaces
+
 if TYPE_CHECKING:
     from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from retarget.rig.model import Joints, Surface
+
     Array = NDArray[np.float64]
 
 COMPONENT = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}
+TRIANGLE = np.array([[0, 1, 2]], np.uint16)
 KIND = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
 
 
@@ -114,11 +122,18 @@ def two_joint_file() -> GlbFile:
 
 def rewrite_json(glb: bytes, change: Any) -> bytes:
     """The GLB with `change` applied to its document, which it may alter or replace."""
-    import json
-
     length = struct.unpack_from("<I", glb, 12)[0]
     document = json.loads(glb[20 : 20 + length])
     text = json.dumps(change(document) or document).encode()
     text += b" " * (-len(text) % 4)
     rest = glb[20 + length :]
     return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A) + text + rest
+
+
+def read_mesh(path: Path, *named: str) -> tuple[Joints, tuple[Surface, ...], tuple[str, ...]]:
+    """Joints, surfaces and names of the shapes; `named` nodes are joints too."""
+    glb = read_glb(path)
+    nodes = read_nodes(glb)
+    skeleton = read_skeleton(glb, nodes, named)
+    surfaces, names = read_surfaces(glb, nodes, skeleton)
+    return skeleton.joints(), surfaces, names
