@@ -40,6 +40,9 @@ ISLANDS = (
     Island("socketLeft", (0.08, 0.54, 0.16, 0.64), (0.89, 0.84, 0.99, 0.996)),
 )
 
+INNER_ISLANDS = 2
+"""From this one on, the islands lie inside the head."""
+
 
 def island_of(uv: NDArray[np.float64]) -> NDArray[np.intp]:
     """The number of the island of each triangle, for corners (F, 3, 2) in MakeHuman's layout."""

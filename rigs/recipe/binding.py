@@ -25,6 +25,8 @@ LIP_M = 0.009
 """How far from the line between the lips the inside of the mouth follows them."""
 LID_M = 0.014
 """How far behind its edge the inside of a lid follows it."""
+LID_TRAVEL_M = 0.0075
+"""The upper lid follows its joint where a blink moves it this far, and the less the less a blink moves it."""
 FLESH_M = 0.016
 """A lip or a lid reaches this far from its joints."""
 CORNER_M = 0.002
@@ -58,6 +60,8 @@ class Regions:
     """The inside of the mouth, lips excluded."""
     sockets: NDArray[np.bool_]
     """Behind the lids."""
+    lids: dict[str, NDArray[np.float64]]
+    """For the joint of each upper lid, how far [m] a blink moves the skin, (V,)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,6 +111,12 @@ def _given(
     given[far] = 0
     given[far, -1] = jaw[far]
     given[far, -2] = 1 - jaw[far]
+    for joint, travel in regions.lids.items():
+        lid = travel > LID_TRAVEL_M / 2
+        follow = np.minimum(travel[lid] / LID_TRAVEL_M, 1)
+        given[lid] = 0
+        given[lid, list(sites).index(joint)] = follow
+        given[lid, -2] = 1 - follow
     given[vertices] = np.eye(len(sites), len(sites) + 2)
     return given
 

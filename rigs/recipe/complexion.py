@@ -39,10 +39,10 @@ BROW_LINE_M = (
     (0.0465, 0.0150),
 )
 """(x, y) of the left brow's middle line, from the nose outwards."""
-BROW_HALF_MM = (3.4, 4.0, 3.9, 3.3, 2.3, 0.8)
+BROW_HALF_MM = (2.6, 3.5, 3.6, 3.1, 2.2, 0.8)
 HAIR_LINE_DEG_M = (
     # (angle about the vertical through the skull, height of the hairline): front, temple, whiskers, above the ear, nape
-    (0, 0.0625), (12, 0.0635), (24, 0.068), (34, 0.067), (44, 0.057), (52, 0.044), (58, 0.038), (64, 0.030), (69, 0.010), (74, -0.014),
+    (0, 0.0635), (12, 0.0640), (24, 0.0665), (34, 0.065), (44, 0.057), (52, 0.045), (58, 0.038), (64, 0.030), (69, 0.010), (74, -0.014),
     (84, -0.016), (92, -0.010), (112, -0.012), (125, -0.030), (150, -0.052), (180, -0.058),
 )  # fmt: skip
 SKULL_BEHIND_M = 0.075
@@ -155,7 +155,7 @@ def hair_cover(place: Field, source_uv: Field) -> Field:
 
 def _hair(skin: Field, ground: Ground) -> Field:
     place = ground.place * 1e3
-    above = _above_hairline(ground.place) * 1e3 + 4.0 * fractal(place, 10, 3, seed=71) + 3.0 * value_noise(place, 0.8, seed=75)
+    above = _above_hairline(ground.place) * 1e3 + 2.4 * fractal(place, 8, 3, seed=71) + 3.0 * value_noise(place, 0.8, seed=75)
     cover = smoothstep(-3.0, 11.0, above) * (1 - _ears(ground.source_uv))
     strands = 0.55 * value_noise(place * [1, 0.35, 1], 0.8, seed=81) + 0.45 * value_noise(place, 1.9, seed=82)
     light = 1 + 0.30 * strands + 0.12 * fractal(place, 25, 2, seed=83)
@@ -188,7 +188,7 @@ def _brows(skin: Field, ground: Ground) -> Field:
     )
     hairs = value_noise(strand, 0.40, seed=91) * 0.6 + value_noise(strand, 0.75, seed=92) * 0.4
     depth = 1 - np.abs(across) / half[nearest]
-    ends = smoothstep(-1.5, 4.0, along) * smoothstep(length + 1.5, length - 6, along)
+    ends = smoothstep(-2.5, 7.0, along) * smoothstep(length + 1.5, length - 6, along)
     body = smoothstep(-0.45, 0.55, depth + 0.55 * hairs) * ends
     cover = body * (0.72 + 0.28 * smoothstep(-0.5, 0.5, hairs)) * ground.brows
     return blend(skin, np.array(BROW) * (1 + 0.2 * hairs)[:, None], 0.88 * cover)

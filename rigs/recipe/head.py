@@ -9,7 +9,7 @@ import numpy as np
 
 from retarget.geometry import apply, kabsch
 from rigs.recipe import pictures
-from rigs.recipe.atlas import ISLANDS, island_of, pack
+from rigs.recipe.atlas import INNER_ISLANDS, ISLANDS, island_of, pack
 from rigs.recipe.binding import HEAD, JAW, NECK, Binding, Bones, Regions, bind_skin, gather
 from rigs.recipe.complexion import Ground, complexion, hair_cover
 from rigs.recipe.eyes import eyeball, fit_sphere
@@ -41,6 +41,8 @@ SPLITS, LONGEST_EDGE_M = 2, 0.014
 HAIR_M = 0.0035
 LIPS_UP_M = (0.0009, -0.0002)
 """How far the lower and the upper lip move to shut the mouth."""
+LIPS_LOOSE = 0.35
+"""The shapes are ironed this much on the lips, fully on the cheeks."""
 SKIN_SIZE, SKIN_QUALITY = 1024, 90
 LASH = (34, 25, 21)
 EYES = {"eyeLeft": "helper-l-eye", "eyeRight": "helper-r-eye"}
@@ -64,13 +66,13 @@ def build(wheel: Wheel) -> bytes:
     sites = _sites(skin, wheel.mirror(count))
     bones = gather(wheel.bone_weights(count))
     lifted = Bones(*(skin.lift @ row for row in (bones.head, bones.jaw, bones.neck)))
-    binding = bind_skin(skin.positions(base), skin.triangles, sites, lifted, _regions(skin))
+    binding = bind_skin(skin.positions(base), skin.triangles, sites, lifted, _regions(skin, units))
     skin = _close_lips(skin, binding)
     positions = skin.positions(base)
     skeleton = _skeleton(mesh, base, {name: positions[vertex] for name, vertex in sites.items()})
     lip_mask = wheel.lip_mask()
     parts = [
-        _skin_part(skin, base, binding, skeleton, units, _firm(skin, sites, lip_mask)),
+        _skin_part(skin, base, binding, skeleton, units, _firm(skin, sites, lip_mask), _red(skin, lip_mask)),
         _eyes_part(mesh, base, skeleton, units),
         _mouth_part(mesh, base, skeleton, units),
         _lashes_part(mesh, base, skin, binding, skeleton, units),
@@ -172,14 +174,19 @@ def _skeleton(mesh: BaseMesh, base: NDArray[np.float64], sites: dict[str, NDArra
 
 def _firm(skin: Skin, sites: dict[str, int], lip_mask: NDArray[np.float64]) -> NDArray[np.intp]:
     """Vertices about which the shapes keep their detail: the red of the lips, the mouth, the sockets, nose and brows."""
-    red = look_up(lip_mask, skin.uv.reshape(-1, 2)) > 0.5
-    regions = _regions(skin)
-    inside = np.flatnonzero(regions.mouth | regions.sockets)
+    inside = np.unique(skin.triangles[island_of(skin.uv) >= INNER_ISLANDS])
     fine = [vertex for name, vertex in sites.items() if name.startswith(("lip", "lid", "eye", "nose", "brow"))]
-    return np.unique(np.concatenate([skin.triangles.ravel()[red], inside, fine]))
+    return np.unique(np.concatenate([np.flatnonzero(_red(skin, lip_mask)), inside, fine]))
 
 
-def _regions(skin: Skin) -> Regions:
+def _red(skin: Skin, lip_mask: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(V,) the vertices on the red of the lips."""
+    red = np.zeros(skin.lift.shape[0], dtype=bool)
+    red[skin.triangles] = look_up(lip_mask, skin.uv.reshape(-1, 2)).reshape(-1, 3) > 0.5
+    return red
+
+
+def _regions(skin: Skin, units: dict[str, NDArray[np.float64]]) -> Regions:
     island = island_of(skin.uv)
     inside = {}
     for number, entry in enumerate(ISLANDS):
@@ -187,7 +194,8 @@ def _regions(skin: Skin) -> Regions:
         only[skin.triangles[island == number]] = True
         only[skin.triangles[island != number]] = False
         inside[entry.name] = only
-    return Regions(inside["mouth"], inside["socketLeft"] | inside["socketRight"])
+    lids = {f"lidUpper{side}": np.linalg.norm(skin.lift @ units[f"eyeBlink{side}"], axis=1) for side in ("Left", "Right")}
+    return Regions(inside["mouth"], inside["socketLeft"] | inside["socketRight"], lids)
 
 
 def _skin_part(
@@ -197,6 +205,7 @@ def _skin_part(
     skeleton: Skeleton,
     units: dict[str, NDArray[np.float64]],
     firm: NDArray[np.intp],
+    red: NDArray[np.bool_],
 ) -> Part:
     """The skin with a vertex for every (place, texture coordinate) pair."""
     positions = skin.positions(base)
@@ -205,7 +214,7 @@ def _skin_part(
     unique, index = np.unique(corners, axis=0, return_inverse=True)
     vertex = unique[:, 0].astype(int)
     joints, weights = _rig_influences(binding, skeleton)
-    loose = looseness(positions, skin.triangles, firm)
+    loose = np.maximum(looseness(positions, skin.triangles, firm), LIPS_LOOSE * red)
     shapes = {name: iron(skin.lift @ offsets, skin.triangles, loose)[vertex] for name, offsets in units.items()}
     return Part(
         "skin",

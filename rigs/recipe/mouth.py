@@ -111,9 +111,12 @@ def picture_edges() -> NDArray[np.float64]:
 def tongue(
     positions: NDArray[np.float64], triangles: NDArray[np.intp], joint: int, shapes: dict[str, NDArray[np.float64]]
 ) -> Part:
-    """The tongue (V, 3) [m], root at the back, with its share of the picture; lies flatter than MakeHuman's."""
+    """The tongue (V, 3) [m], root at the back, with its share of the picture; lies flatter than MakeHuman's, but comes out as high."""
     root = np.array([0.0, positions[:, 1].min(), positions[:, 2].min()])
-    positions = root + (positions - root) * TONGUE_SCALE + TONGUE_SHIFT_M
+    lowered = root + (positions - root) * TONGUE_SCALE + TONGUE_SHIFT_M
+    out = np.linalg.norm(shapes["tongueOut"], axis=1, keepdims=True)
+    shapes = shapes | {"tongueOut": shapes["tongueOut"] + out / out.max() * (positions - lowered)}
+    positions = lowered
     low, high = positions.min(0), positions.max(0)
     unit = (positions - low) / (high - low)
     uv = np.stack([unit[:, 2], 0.52 + 0.46 * unit[:, 0]], axis=1)
