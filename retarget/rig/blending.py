@@ -2,7 +2,7 @@
 
 Linear: p' = sum_i w_i M_i p (Magnenat-Thalmann 1988), what glTF asks for. It shrinks where joints turn against each
 other. Dual quaternions: the rigid motions themselves are blended, so the volume stays, at twice the cost (Kavan et
-al., "Geometric skinning with approximate dual quaternion blending", ACM TOG 27(4), 2008).
+al., "Geometric skinning with approximate dual quaternion blending", ACM TOG 27(4):105, 2008).
 Motions are ``T_rig_mesh``: from the bind pose to ``rig``, which is the identity where a joint stands as it was bound.
 """
 
@@ -52,14 +52,12 @@ class LinearBlend:
 class DualQuaternionBlend:
     """Dual quaternion linear blending; motions must be rigid.
 
-    q and -q are the same turn, so every motion is first brought to the hemisphere of the vertex's heaviest joint
-    (Kavan 2008, section 4.1).
+    q and -q are the same turn, so every motion is first brought to the hemisphere of the vertex's heaviest joint.
     """
 
     def __init__(self, weights: Sparse) -> None:
         """For `weights` (V, J) with rows that add up to 1, none of them empty."""
-        self._weights = weights.copy()
-        self._rest_weights = weights.data.copy()
+        self._weights = weights
         rows = np.repeat(np.arange(weights.shape[0]), np.diff(weights.indptr))
         heaviest = np.lexsort((-weights.data, rows))[weights.indptr[:-1]]
         pivots = weights.indices[heaviest][rows]
@@ -69,8 +67,9 @@ class DualQuaternionBlend:
         """As `Blend`."""
         turns = quat_from_matrix(T_rig_mesh[:, :3, :3])
         signs = np.where(turns @ turns.T < 0, -1.0, 1.0).astype(np.float32)
-        self._weights.data = self._rest_weights * signs.ravel()[self._pairs]
-        blended = np.ascontiguousarray((self._weights @ _dual_quaternions(turns, T_rig_mesh[:, :3, 3])).T)  # (8, V)
+        signed = self._weights.copy()  # the object may be called from several threads
+        signed.data *= signs.ravel()[self._pairs]
+        blended = np.ascontiguousarray((signed @ _dual_quaternions(turns, T_rig_mesh[:, :3, 3])).T)  # (8, V)
         blended /= np.sqrt(np.einsum("qv,qv->v", blended[:4], blended[:4]))
         return _move(blended[:4], blended[4:], np.ascontiguousarray(positions.T))
 
@@ -79,7 +78,7 @@ BLENDS: dict[str, Callable[[Sparse], Blend]] = {"linear": LinearBlend, "dual-qua
 
 
 def _dual_quaternions(turns: Array, translations: Array) -> Array32:
-    """(J, 8) of unit quaternions (J, 4) xyzw and translations (J, 3): the turn r, and the dual part t r / 2 (eq. 2)."""
+    """(J, 8) of unit quaternions (J, 4) xyzw and translations (J, 3): the turn r, and the dual part t r / 2."""
     vector, scalar = turns[:, :3], turns[:, 3:]
     dual_vector = scalar * translations + np.cross(translations, vector)
     dual_scalar = -np.sum(translations * vector, axis=1, keepdims=True)
@@ -87,7 +86,7 @@ def _dual_quaternions(turns: Array, translations: Array) -> Array32:
 
 
 def _move(real: Array32, dual: Array32, points: Array32) -> Array32:
-    """(V, 3): points (3, V) moved by unit dual quaternions, parts (4, V) each (Algorithm 1).
+    """(V, 3): points (3, V) moved by unit dual quaternions, parts (4, V) each.
 
     For the real part (v, w) and the dual part (d, e), p + 2 v x (v x p + w p) is the turn and 2 (w d - e v + v x d) the
     translation; together p + 2 (v x (v x p + w p + d) + w d - e v).

@@ -82,7 +82,7 @@ class Glb:
     def array(self, index: int) -> NDArray[Any]:
         """An accessor's values: (N,) for SCALAR, (N, n) for VECn, (N, n, n) with rows first for MATn.
 
-        Integers marked normalised become float32 in [0, 1] or [-1, 1] (section 3.6.2.2); others keep their type. Sparse
+        Integers marked normalised become float32 in [0, 1] or [-1, 1]; others keep their type. Sparse
         values are filled in.
         """
         accessor = self.entry("accessors", index)

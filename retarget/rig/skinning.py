@@ -44,7 +44,7 @@ class Deformed:
 
 
 class Skin:
-    """Deforms the surfaces of one rig; make it once and call it for every pose. Keeps no history."""
+    """Deforms the surfaces of one rig; make it once and call it for every pose, from any thread."""
 
     def __init__(self, rig: Rig, method: SkinningMethod = "linear") -> None:
         """For `rig`; InputError for an unknown `method`, or dual quaternions where a bind matrix is not rigid."""
