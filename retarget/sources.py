@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
     from retarget.frames import MarkerFrame
     from retarget.markers.clip import MarkerClip
+    from retarget.take.reader import Take
+    from retarget.udp.datagram import Datagram
     from retarget.udp.natnet.source import NatNetSource
 
 
@@ -98,6 +100,53 @@ class ClipSource:
             if self._stopped:
                 return
             self._given += 1
+            yield frame
+
+
+class TakeSource:
+    """A recorded session, decoded again as it is read."""
+
+    live = False
+    frame_count = None
+
+    def __init__(self, take: Take) -> None:
+        from retarget.take.decode import TakeFrames
+
+        self._frames = TakeFrames(take)
+        self._stopped = False
+
+    @property
+    def rate_hz(self) -> float | None:
+        """As the server told [Hz]."""
+        return self._frames.session.rate_hz
+
+    def counts(self) -> dict[str, int]:
+        """What became of the datagrams on their way to the recorder."""
+        framing = self._frames.session.framing
+        return {
+            "received": framing.delivered,
+            "lost": framing.lost,
+            "doubled": framing.doubled,
+            "late": framing.late,
+            "malformed": self._frames.session.malformed,
+        }
+
+    def stop(self) -> None:
+        """No frame after the current one."""
+        self._stopped = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        for frame in self._frames:
+            if self._stopped:
+                return
             yield frame
 
 
@@ -181,12 +230,18 @@ class Paced:
             yield frame
 
 
-def open_source(where: str) -> Source:
-    """The source for a file or an address, not yet opened; InputError where none takes it."""
+def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> Source:
+    """The source for a file or an address, not yet opened; `tap` is given every datagram of a live one.
+
+    InputError where no source takes `where`, and for a `tap` on what is no live stream.
+    """
     name = where.split("://", 1)[0] if "://" in where else Path(where).suffix.lower()
-    known = {**SCHEMES, **ENDINGS}
-    if name in known:
-        return known[name](where)
+    if name in SCHEMES:
+        return SCHEMES[name](where, tap)
+    if tap is not None:
+        raise InputError(f"{where} is no live stream; only one of {', '.join(_addresses())} can be recorded.")
+    if name in ENDINGS:
+        return ENDINGS[name](where)
     for entry in entry_points(group="retarget.sources", name=name):
         source: Source = entry.load()(where)
         return source
@@ -198,20 +253,33 @@ def open_source(where: str) -> Source:
 def known_sources() -> list[str]:
     """What a source can be, for people to read."""
     others = sorted(entry.name for entry in entry_points(group="retarget.sources"))
-    return [*(f"{scheme}://HOST" for scheme in SCHEMES), *(f"*{ending}" for ending in ENDINGS), *others]
+    return [*_addresses(), *(f"*{ending}" for ending in ENDINGS), *others]
 
 
-def _c3d(where: str) -> Source:
-    from retarget.markers.c3d import read_c3d
-
-    return ClipSource(read_c3d(Path(where)))
+def _addresses() -> list[str]:
+    return [f"{scheme}://HOST" for scheme in SCHEMES]
 
 
-def _natnet(where: str) -> Source:
+def _clip(where: str) -> Source:
+    from retarget.take.convert import read_clip
+
+    return ClipSource(read_clip(Path(where)))
+
+
+def _take(where: str) -> Source:
+    from retarget.take.reader import read_take
+
+    return TakeSource(read_take(Path(where)))
+
+
+def _natnet(where: str, tap: Callable[[Datagram], None] | None) -> Source:
     from retarget.udp.natnet.source import NatNetSource
 
-    return NatNetMarkers(NatNetSource(where))
+    return NatNetMarkers(NatNetSource(where, tap=tap))
 
 
-SCHEMES: dict[str, Callable[[str], Source]] = {"natnet": _natnet}
-ENDINGS: dict[str, Callable[[str], Source]] = {".c3d": _c3d}
+SCHEMES: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {"natnet": _natnet}
+ENDINGS: dict[str, Callable[[str], Source]] = {
+    **dict.fromkeys((".mcap", ".pcapng", ".pcap"), _take),
+    **dict.fromkeys((".c3d", ".trc", ".csv"), _clip),
+}

@@ -15,7 +15,9 @@ from retarget.errors import RetargetError
 
 COMMANDS = {
     "run": "Solve a source for a rig: to a window, films, pictures and tables.",
+    "record": "Record a live stream, whole and safe from crashes.",
     "replay": "Serve a take as a live NatNet server.",
+    "convert": "Change a take's or a marker file's format.",
     "inspect": "Show what is in a take, a rig or a performer file.",
     "rigs": "List the rigs that can be driven.",
 }

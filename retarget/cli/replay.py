@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from retarget.errors import InputError
-
 if TYPE_CHECKING:
     from retarget.udp.natnet.pacing import Pace
     from retarget.udp.natnet.reel import Reel
@@ -51,13 +49,15 @@ def command(take: str, **options: Any) -> None:
 
 def open_reel(take: Path) -> Reel:
     """What there is to play in a take; InputError for a file that holds no markers."""
-    from retarget.markers.c3d import read_c3d
+    from retarget.take.convert import TAKES, read_clip
+    from retarget.take.reader import read_take
+    from retarget.take.reel import TakeReel
     from retarget.udp.natnet.reel import MarkerReel
 
-    if take.suffix.lower() == ".c3d" or not take.exists():
-        clip = read_c3d(take)
-        return MarkerReel(list(clip), rate_hz=clip.rate_hz)
-    raise InputError(f"{take} cannot be replayed; a take is a C3D file (*.c3d).")
+    if take.suffix.lower() in TAKES:
+        return TakeReel(read_take(take))
+    clip = read_clip(take)
+    return MarkerReel(list(clip), rate_hz=clip.rate_hz)
 
 
 def _settings(options: dict[str, Any]) -> ServerSettings:

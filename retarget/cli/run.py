@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 import sys
 import threading
 from contextlib import ExitStack, contextmanager
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from retarget.cli.ending import stopped_after, stopped_by_signals
 from retarget.cli.options import Colour, Size, read_config
 from retarget.errors import RetargetError
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from retarget.rig.display.window import Window
     from retarget.sinks import SinkSettings
     from retarget.sources import Source
+    from retarget.take.recorder import TakeRecorder
 
 SINKS_HELP = "window, out.mp4, frames/, poses.csv; may be given several times.  [window]"
 
@@ -32,6 +33,7 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv; may be given several times.  
 @click.option("--rig", default="human", show_default=True, help="Name of a rig, or the path of a rig.toml.")
 @click.option("--performer", type=click.Path(), help="A calibration; without it the first still moment is the neutral.")
 @click.option("--layout", help="Name of a layout, or the path of its TOML file.  [the one whose names fit best]")
+@click.option("--record", type=click.Path(), metavar="TAKE", help="Also record a live source, to a new .mcap file.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long.")
 @click.option(
     "--jaw", type=click.Choice(["signed", "cosine"]), help="How the jaw's angle is read.  [as the performer's]"
@@ -63,15 +65,16 @@ def perform(where: str, targets: tuple[str, ...], seconds: float | None, options
     from retarget.sinks import WINDOW
     from retarget.sources import Paced, open_source
 
-    opened = open_source(where)
-    source = Paced(opened) if WINDOW in targets and not opened.live else opened
     files = tuple(target for target in targets if target != WINDOW)
     session = _session(options)
+    open_source(where)  # a wrong address is told before a take is made
     with ExitStack() as stack:
+        opened = open_source(where, stack.enter_context(_recorder(where, options)) if options["record"] else None)
+        source = Paced(opened) if WINDOW in targets and not opened.live else opened
         window = stack.enter_context(_window(options)) if WINDOW in targets else None
         run = Run(source, session, files, lambda opened: _settings(opened, options), window)
-        stack.enter_context(_interrupts(run))
-        stack.enter_context(_time_limit(run, seconds))
+        stack.enter_context(stopped_by_signals(run.stop, run.abandon))
+        stack.enter_context(stopped_after(seconds, run.stop))
         with run:
             _solve(run, source, window)
             _say_what_waits(run)
@@ -88,6 +91,18 @@ def summary(report: RunReport) -> str:
         dropped = f", {sink.dropped:,} dropped because it was too slow" if sink.dropped else ""
         lines.append(f"{name}: {sink.written:,} poses{dropped}{', ended early' if sink.error else ''}")
     return "\n".join(lines)
+
+
+def _recorder(where: str, options: dict[str, Any]) -> TakeRecorder:
+    from pathlib import Path
+
+    from retarget.cli.record import versions
+    from retarget.take.metadata import TakeMetadata
+    from retarget.take.recorder import TakeRecorder
+
+    performer = options["performer"] or ""
+    about = TakeMetadata(where, options["layout"] or "", options["rig"], performer, versions())
+    return TakeRecorder(Path(options["record"]), about)
 
 
 def _session(options: dict[str, Any]) -> Any:
@@ -162,40 +177,6 @@ def _solve(run: Run, source: Source, window: Window | None) -> None:
 
 
 @contextmanager
-def _interrupts(run: Run) -> Iterator[None]:
-    """The first Ctrl-C (or SIGTERM) ends the stream and completes every file, a second waits for no slow sink."""
-    asked: list[int] = []
-
-    def interrupt(number: int, frame: object) -> None:  # noqa: ARG001
-        asked.append(number)
-        if len(asked) == 1:
-            run.stop()
-        else:
-            run.abandon()
-
-    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for number, action in before.items():
-            signal.signal(number, action)
-
-
-@contextmanager
-def _time_limit(run: Run, seconds: float | None) -> Iterator[None]:
-    if seconds is None:
-        yield
-        return
-    timer = threading.Timer(seconds, run.stop)
-    timer.daemon = True
-    timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()
-
-
-@contextmanager
 def _progress(frames: int | None) -> Iterator[Callable[[], None]]:
     """A bar on a terminal, for a source whose length is known."""
     if frames is None or not sys.stderr.isatty():
@@ -211,4 +192,4 @@ def _progress(frames: int | None) -> Iterator[Callable[[], None]]:
 
 def _say_what_waits(run: Run) -> None:
     if run.unwritten > 100:
-        click.echo(f"{run.unwritten:,} poses are still to be drawn; Ctrl-C leaves them out.", err=True)
+        click.echo(f"{run.unwritten:,} poses still wait to be written; Ctrl-C leaves them out.", err=True)
