@@ -68,6 +68,7 @@ def weld(positions: Array, normals: Array | None = None, motion: Sparse | None =
     two lips). Without these the place alone counts.
     """
     _, place = np.unique(np.ascontiguousarray(positions), axis=0, return_inverse=True)
+    place = place.reshape(-1)  # numpy 2.0 alone gives it a second axis
     groups = np.arange(len(positions))
     left = np.flatnonzero(np.bincount(place)[place] > 1) if len(place) else groups
     for _ in range(MAX_ROUNDS):
