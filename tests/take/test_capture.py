@@ -112,6 +112,44 @@ def test_classic_captures_of_both_byte_orders_and_resolutions(
     assert take.metadata.clock_offset_ns == 1_700_000_002 * 10**9 + 250_000 * fraction_ns
 
 
+def block(order: str, kind: int, body: bytes) -> bytes:
+    length = struct.pack(order + "I", len(body) + 12)
+    return struct.pack(order + "I", kind) + length + body + length
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize(("resolution", "ticks"), [(9, 1_500_000_000), (3, 1_500), (0x94, 3 << 19)])
+def test_every_byte_order_resolution_and_kind_of_block_of_pcapng_is_read(
+    tmp_path: Path, order: str, resolution: int, ticks: int
+) -> None:
+    """1.5 s after the interface's offset of 100 s, whatever a tick is; the unknown block in between does no harm."""
+    section = block(order, 0x0A0D0D0A, struct.pack(order + "IHHq", 0x1A2B3C4D, 1, 0, -1))
+    options = struct.pack(order + "HHB3x", 9, 1, resolution) + struct.pack(order + "HHq", 14, 8, 100) + bytes(4)
+    interface = block(order, 1, struct.pack(order + "HHI", 101, 0, 0) + options)
+    packet = ip_packets(b"\7\0\2\0ab")[0]
+    padded = packet + bytes(-len(packet) % 4)
+    stamp = (ticks >> 32, ticks & 0xFFFF_FFFF, len(packet), len(packet))
+    enhanced = block(order, 6, struct.pack(order + "IIIII", 0, *stamp) + padded)
+    old = block(order, 2, struct.pack(order + "HHIIII", 0, 0, *stamp) + padded)
+    simple = block(order, 3, struct.pack(order + "I", len(packet)) + padded)
+    path = tmp_path / "made.pcapng"
+    path.write_bytes(section + interface + enhanced + block(order, 0xBAD, b"what") + simple + old)
+    take = read_take(path)
+    assert [d.payload for d in take] == [b"\7\0\2\0ab"] * 2
+    assert take.metadata.clock_offset_ns == 101_500_000_000
+
+
+def test_second_section_may_have_another_byte_order(tmp_path: Path) -> None:
+    parts = b""
+    packet = ip_packets(b"\7\0\0\0")[0]
+    for order in "<>":
+        parts += block(order, 0x0A0D0D0A, struct.pack(order + "IHHq", 0x1A2B3C4D, 1, 0, -1))
+        parts += block(order, 1, struct.pack(order + "HHI", 101, 0, 0))
+        parts += block(order, 6, struct.pack(order + "IIIII", 0, 0, 7, len(packet), len(packet)) + packet)
+    (tmp_path / "two.pcapng").write_bytes(parts)
+    assert len(list(read_take(tmp_path / "two.pcapng"))) == 2
+
+
 ETHERNET = bytes(12) + b"\x08\x00"
 
 

@@ -7,10 +7,12 @@ import subprocess
 import sys
 import threading
 import time
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import pytest
 from mcap.reader import make_reader
+from mcap.stream_reader import StreamReader
 
 from retarget.errors import OutputError
 from retarget.take.message import TOPICS, unpack
@@ -44,6 +46,10 @@ def test_stock_mcap_reader_finds_every_datagram_metadata_and_attachment(tmp_path
         found = [(channel, message) for _, channel, message in reader.iter_messages(log_time_order=False)]
         summary, attachments = reader.get_summary(), list(reader.iter_attachments())
         [metadata] = [record.metadata for record in reader.iter_metadata() if record.name == RECORD_NAME]
+    with path.open("rb") as file:
+        kinds = Counter(type(record).__name__ for record in StreamReader(file, validate_crcs=True).records)
+    assert kinds["Message"] == len(datagrams)
+    assert kinds["ChunkIndex"] * 2 >= kinds["MessageIndex"] > 0
     assert [unpack(message.data, channels[channel.topic]) for channel, message in found] == datagrams
     assert [message.log_time for _, message in found] == [round(d.received_s * 1e9) + 10**18 for d in datagrams]
     assert summary is not None
