@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from retarget.take.decode import TakeFrames, rate_of_steps, shortest_float32
+from retarget.take.decode import TakeFrames
 from retarget.take.visibility import Visibility
 
 if TYPE_CHECKING:
@@ -111,12 +111,11 @@ def inspect_take(take: Take) -> Inspection:
     for frame in source:
         visibility.add(frame)
     session, times = source.session, np.array(visibility.received_s)
-    rate = session.rate_hz
     return Inspection(
         path=take.path,
         facts=_facts(take, session),
         duration_s=take.duration_s,
-        rate_hz=rate_of_steps(np.diff(times)) if rate is None else shortest_float32(rate),
+        rate_hz=source.rate_hz,
         channels=channels,
         frames=_frames(visibility, session),
         markers=visibility.markers(times),

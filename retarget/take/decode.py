@@ -7,7 +7,7 @@ those of the recorder's monotonic clock.
 from __future__ import annotations
 
 import logging
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 _MOST_TIMES_LONGER: Final = 20
 """A gap in the frame numbers becomes a gap in the clip unless that makes the take so many times longer."""
+_FRAMES_FOR_RATE: Final = 240
 
 log = logging.getLogger("retarget.take")
 
@@ -43,14 +44,21 @@ class TakeFrames:
         self.take = take
         self._conversation = find_conversation(take)
         self.session: NatNetSession = self._conversation.session(take)
-        """The decoder: server, bitstream, rate, and counts of what was lost, doubled and malformed."""
+        """The decoder: server, bitstream, and counts of what was lost, doubled and malformed."""
+        self._others: set[str] = set()
+        trial = self._conversation.session(take)
+        first = list(islice(self._decoded(trial), _FRAMES_FOR_RATE))
+        self.rate_hz = _rate_hz(trial, first)
+        """Frames a second, as the server said, else as its first time stamps say; None where neither tells."""
 
     def __iter__(self) -> Iterator[MarkerFrame]:
-        self.session = session = self._conversation.session(self.take)
-        others: set[str] = set()
+        self.session = self._conversation.session(self.take)
+        return self._decoded(self.session)
+
+    def _decoded(self, session: NatNetSession) -> Iterator[MarkerFrame]:
         for datagram in self.take:
             if datagram.peer[0] != self._conversation.server:
-                self._note_other(datagram, others)
+                self._note_other(datagram)
             elif datagram.direction == "out":
                 note_sent(session, datagram)
             elif (frame := session.receive(datagram.payload, datagram.received_s)) is not None:
@@ -58,11 +66,11 @@ class TakeFrames:
         if not session.framing.delivered:
             raise InputError(f"{self.take.path}: none of its frames can be read as bitstream {session.bitstream}")
 
-    def _note_other(self, datagram: Datagram, known: set[str]) -> None:
+    def _note_other(self, datagram: Datagram) -> None:
         """Say once of every other server that it is not read."""
         server = datagram.peer[0]
-        if datagram.channel == "data" and server not in known:
-            known.add(server)
+        if datagram.channel == "data" and server not in self._others:
+            self._others.add(server)
             log.warning(
                 "%s: the frames of %s are read, those of %s not", self.take.path, self._conversation.server, server
             )
@@ -85,6 +93,8 @@ def clip_of(take: Take) -> MarkerClip:
         raise InputError(
             f"{take.path}: no marker in it has a name; switch on labelled markers in the sender's settings"
         )
+    if source.rate_hz is None:
+        raise InputError(f"{take.path} is too short to tell how many frames a second it has")
     rows, notes = _rows([frame.number for frame in found])
     positions = np.full((rows[-1] + 1, len(names), 3), np.nan)
     column = {name: i for i, name in enumerate(names)}
@@ -95,7 +105,7 @@ def clip_of(take: Take) -> MarkerClip:
         notes = (*notes, f"{loose} frames hold points without a name; these are left out.")
     return MarkerClip(
         layout=MarkerLayout(take.path.stem, names),
-        rate_hz=_rate_hz(source.session, found),
+        rate_hz=source.rate_hz,
         positions=positions,
         source=take.path,
         first_frame=found[0].number,
@@ -122,15 +132,11 @@ def _rows(numbers: Sequence[int]) -> tuple[list[int], tuple[str, ...]]:
     return [number - numbers[0] for number in numbers], notes
 
 
-def _rate_hz(session: NatNetSession, found: Sequence[MarkerFrame]) -> float:
-    """What the server said, else from its time stamps [Hz]."""
+def _rate_hz(session: NatNetSession, found: Sequence[MarkerFrame]) -> float | None:
     if session.rate_hz is not None:
         return shortest_float32(session.rate_hz)
     pairs = [(a, b) for a, b in pairwise(found) if b.number > a.number]
-    rate = rate_of_steps(np.array([(b.time_s - a.time_s) / (b.number - a.number) for a, b in pairs]))
-    if rate is None:
-        raise InputError("The take is too short to tell how many frames a second it has")
-    return rate
+    return rate_of_steps(np.array([(b.time_s - a.time_s) / (b.number - a.number) for a, b in pairs]))
 
 
 def rate_of_steps(steps_s: NDArray[np.float64]) -> float | None:

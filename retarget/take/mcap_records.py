@@ -23,8 +23,8 @@ FOOTER_BYTES: Final = RECORD_HEAD.size + 20
 HEADER, FOOTER, CHANNEL, MESSAGE, CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 0x01, 0x02, 0x04, 0x05, 0x06, 0x07, 0x08
 ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, DATA_END = 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x0F
 
-MAX_UNCOMPRESSED_BYTES: Final = 64 * 1024 * 1024
-"""Of one chunk: a thousand times what the recorder writes."""
+MAX_UNCOMPRESSED_BYTES: Final = 16 * 1024 * 1024
+"""Of one chunk; the recorder writes 64 KiB, other programs some MiB."""
 
 _MESSAGE_HEAD: Final = struct.Struct("<HIQQ")
 _CHUNK_HEAD: Final = struct.Struct("<QQQII")

@@ -28,13 +28,15 @@ def motive_session() -> Path:
     return SESSION
 
 
-def made_up(count: int, start_s: float = 1000.0, rate_hz: float = 120.0, seed: int = 1) -> list[Datagram]:
+def made_up(
+    count: int, longest: int = 300, seed: int = 1, start_s: float = 1000.0, rate_hz: float = 120.0
+) -> list[Datagram]:
     """`count` datagrams with random bytes; every tenth goes out on the command channel."""
     rng = random.Random(seed)
     return [
         Datagram(start_s + i / rate_hz, "out", "command", ("10.0.0.7", 1510), rng.randbytes(12))
         if i % 10 == 9
-        else Datagram(start_s + i / rate_hz, "in", "data", ("10.0.0.7", 1511), rng.randbytes(rng.randint(0, 300)))
+        else Datagram(start_s + i / rate_hz, "in", "data", ("10.0.0.7", 1511), rng.randbytes(rng.randint(0, longest)))
         for i in range(count)
     ]
 

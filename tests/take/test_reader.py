@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 @pytest.fixture
 def small_take(tmp_path: Path) -> tuple[Path, list[list[Datagram]], list[int]]:
     """A file of four chunks of seven datagrams, and the file's size after the opening and after each chunk."""
-    datagrams, path = made_up(28), tmp_path / "small.mcap"
+    datagrams, path = made_up(28, longest=40), tmp_path / "small.mcap"
     chunks = [datagrams[i : i + 7] for i in range(0, 28, 7)]
     return path, chunks, write_chunks(path, chunks)
 
