@@ -1,0 +1,1 @@
+"""Pictures in, landmarks out: where pictures come from, detectors, the head's pose and measures of the face."""

@@ -1,0 +1,1 @@
+"""Landmarks, poses and measures, against other programs and known truth."""
