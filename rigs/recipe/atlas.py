@@ -1,7 +1,7 @@
 """Lay the skin out for painting: MakeHuman's texture islands of the head, turned upright and packed into one square.
 
-The face gets most of the picture: columns are stretched towards the middle by u' = (1 + c) u / (1 + c |u|). Afterwards texture coordinates
-follow glTF, (0, 0) in the upper left corner.
+The face gets most of the picture: columns are stretched towards the middle by u' = (1 + c) u / (1 + c |u|). Afterwards
+texture coordinates follow glTF, (0, 0) in the upper left corner.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse import csgraph
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,35 +38,37 @@ ISLANDS = (
     Island("socketLeft", (0.08, 0.54, 0.16, 0.64), (0.89, 0.84, 0.99, 0.996)),
 )
 
-INNER_ISLANDS = 2
-"""From this one on, the islands lie inside the head."""
+
+def islands(uv: NDArray[np.float64]) -> dict[str, NDArray[np.bool_]]:
+    """For every island, which triangles lie on it, (F,); corners (F, 3, 2) in MakeHuman's layout."""
+    x, y = uv.mean(1).T
+    found = {
+        entry.name: (x > entry.source[0]) & (y > entry.source[1]) & (x < entry.source[2]) & (y < entry.source[3])
+        for entry in ISLANDS
+    }
+    missed = len(uv) - sum(int(inside.sum()) for inside in found.values())
+    if missed:
+        raise ValueError(f"{missed} triangles lie outside every known island")
+    return found
 
 
-def island_of(uv: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The number of the island of each triangle, for corners (F, 3, 2) in MakeHuman's layout."""
-    middle = uv.mean(1)
-    island = np.full(len(uv), -1)
-    for number, entry in enumerate(ISLANDS):
-        left, low, right, high = entry.source
-        inside = (middle[:, 0] > left) & (middle[:, 0] < right) & (middle[:, 1] > low) & (middle[:, 1] < high)
-        island[inside] = number
-    if (island < 0).any():
-        raise ValueError(f"{(island < 0).sum()} triangles lie outside every known island")
-    return island
+def inner(uv: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """(F,) which triangles lie inside the head: in the mouth or behind the lids."""
+    found = islands(uv)
+    return np.asarray(found["mouth"] | found["socketRight"] | found["socketLeft"])
 
 
 def pack(uv: NDArray[np.float64]) -> NDArray[np.float64]:
     """Corners (F, 3, 2) in MakeHuman's layout to the picture's (origin in the upper left)."""
-    island = island_of(uv)
+    found = islands(uv)
     packed = np.empty_like(uv)
-    for number, entry in enumerate(ISLANDS):
-        chosen = island == number
-        place = uv[chosen]
+    for entry in ISLANDS:
+        place = uv[found[entry.name]]
         low, high = place.min((0, 1)), place.max((0, 1))
         unit = (place - low) / (high - low)
         unit = unit[..., ::-1] if entry.upright else np.stack([unit[..., 0], 1 - unit[..., 1]], axis=-1)
         across = 2 * unit[..., 0] - 1
         unit[..., 0] = 0.5 + 0.5 * (1 + entry.stretch) * across / (1 + entry.stretch * np.abs(across))
         left, top, right, bottom = entry.goal
-        packed[chosen] = [left, top] + unit * [right - left, bottom - top]
+        packed[found[entry.name]] = [left, top] + unit * [right - left, bottom - top]
     return packed

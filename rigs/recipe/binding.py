@@ -1,7 +1,8 @@
 """Bind the skin to the joints: one joint a site, and the skull, the jaw and the neck for the rest.
 
-Sites blend among each other by bounded biharmonic weights. Far from every site the skin keeps MakeHuman's own weights for head, jaw
-and neck. Nothing crosses the mouth or the lids: the joints of the lower lip have bound 0 on the upper one, and the other way round.
+Sites blend among each other by bounded biharmonic weights. Far from every site the skin keeps MakeHuman's own weights
+for head, jaw and neck. Nothing crosses the mouth or the lids: the joints of the lower lip have bound 0 on the upper
+one, and the other way round.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigs.recipe.sites import rides_jaw
+from rigs.recipe.skeleton import HEAD, JAW, NECK
 from rigs.recipe.weights import bounded_biharmonic, strongest, surface_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-HEAD, JAW, NECK = "head", "jaw", "neck"
 INFLUENCES = 4
 REACH_M = 0.030
 """Skin farther than this from every site, along the surface, keeps MakeHuman's weights."""

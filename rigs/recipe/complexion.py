@@ -1,6 +1,7 @@
 """The colours of the skin: tone, blush, lips, brows, cropped hair, the rims of the lids, the inside of the mouth.
 
-All colours are sRGB in [0, 255]. Places are metres from the middle between the eyes, so that they fit any identity of similar size.
+All colours are sRGB in [0, 255]. Places are metres from the middle between the eyes, so that they fit any identity of
+similar size.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 TONE = (214.0, 168.0, 142.0)
 FLUSH = (204.0, 128.0, 112.0)
-LIP = (183.0, 106.0, 98.0)
+LIP = (188.0, 113.0, 103.0)
 SHADE = (112.0, 62.0, 50.0)
 HAIR = (58.0, 43.0, 34.0)
 BROW = (62.0, 44.0, 34.0)
@@ -41,9 +42,10 @@ BROW_LINE_M = (
 """(x, y) of the left brow's middle line, from the nose outwards."""
 BROW_HALF_MM = (2.6, 3.5, 3.6, 3.1, 2.2, 0.8)
 HAIR_LINE_DEG_M = (
-    # (angle about the vertical through the skull, height of the hairline): front, temple, whiskers, above the ear, nape
-    (0, 0.0635), (12, 0.0640), (24, 0.0665), (34, 0.065), (44, 0.057), (52, 0.045), (58, 0.038), (64, 0.030), (69, 0.010), (74, -0.014),
-    (84, -0.016), (92, -0.010), (112, -0.012), (125, -0.030), (150, -0.052), (180, -0.058),
+    # (angle about the vertical through the skull, height of the hairline)
+    (0, 0.0635), (12, 0.0640), (24, 0.0665), (34, 0.0650), (44, 0.0570), (52, 0.0450),  # forehead and temple
+    (58, 0.0380), (64, 0.0300), (69, 0.0100), (74, -0.0140), (84, -0.0160),  # whiskers
+    (92, -0.0100), (112, -0.0120), (125, -0.0300), (150, -0.0520), (180, -0.0580),  # above the ear, nape
 )  # fmt: skip
 SKULL_BEHIND_M = 0.075
 EAR_UV = ((0.8434, 0.6305), (0.8434, 0.3365))
@@ -68,8 +70,8 @@ class Ground:
     """(N,) distance from the inner rims of the lids along the surface [m]."""
     socket: Field
     """(N,) 1 behind the lids, else 0."""
-    brows: Field
-    """(N,) 1 on the outside of the face, else 0: where brows may grow."""
+    outside: Field
+    """(N,) 1 on the front of the head, 0 behind and inside: where brows may grow."""
 
 
 def complexion(ground: Ground, spots: dict[str, Field]) -> Field:
@@ -88,7 +90,7 @@ def _near(ground: Ground, spot: Field, radii_mm: tuple[float, float, float]) -> 
     """A soft ellipsoid about `spot` and its mirror image: 1 in the middle, 0.37 at the radii."""
     mirrored = np.abs(ground.place) * [1, 0, 0] + ground.place * [0, 1, 1]
     away = (mirrored - np.abs(spot) * [1, 0, 0] - spot * [0, 1, 1]) / (np.array(radii_mm) * 1e-3)
-    return np.exp(-(away**2).sum(-1))
+    return np.asarray(np.exp(-(away**2).sum(-1)))
 
 
 def _tone(ground: Ground) -> Field:
@@ -137,7 +139,7 @@ def _lips(skin: Field, ground: Ground) -> Field:
     creases = value_noise(place * [1, 0.12, 0.3], 0.8, seed=61)
     softness = smoothstep(0.25, 0.85, ground.lips + 0.05 * value_noise(place, 1.2, seed=62))
     colour = np.array(LIP) * (1 + 0.035 * creases + 0.03 * fractal(place, 5, 2, seed=63))[:, None]
-    return blend(skin, colour, 0.92 * softness)
+    return blend(skin, colour, 0.85 * softness)
 
 
 def _above_hairline(place: Field) -> Field:
@@ -149,13 +151,17 @@ def _above_hairline(place: Field) -> Field:
 
 
 def hair_cover(place: Field, source_uv: Field) -> Field:
-    """(N,) 1 where the hair of the head grows, 0 on bare skin, for places (N, 3) [m] from the middle between the eyes."""
+    """(N,) 1 where the hair of the head grows, 0 on bare skin; places (N, 3) [m] from the middle between the eyes."""
     return smoothstep(0.0, 0.022, _above_hairline(place)) * (1 - _ears(source_uv))
 
 
 def _hair(skin: Field, ground: Ground) -> Field:
     place = ground.place * 1e3
-    above = _above_hairline(ground.place) * 1e3 + 2.4 * fractal(place, 8, 3, seed=71) + 3.0 * value_noise(place, 0.8, seed=75)
+    above = (
+        _above_hairline(ground.place) * 1e3
+        + 2.4 * fractal(place, 8, 3, seed=71)
+        + 3.0 * value_noise(place, 0.8, seed=75)
+    )
     cover = smoothstep(-3.0, 11.0, above) * (1 - _ears(ground.source_uv))
     strands = 0.55 * value_noise(place * [1, 0.35, 1], 0.8, seed=81) + 0.45 * value_noise(place, 1.9, seed=82)
     light = 1 + 0.30 * strands + 0.12 * fractal(place, 25, 2, seed=83)
@@ -173,7 +179,7 @@ def _brows(skin: Field, ground: Ground) -> Field:
     run = np.r_[0, np.cumsum(np.linalg.norm(np.diff(middle, axis=0), axis=1))]
     half = np.interp(steps, np.arange(len(line)), BROW_HALF_MM)
     x, y = np.abs(ground.place[:, 0]) * 1e3, ground.place[:, 1] * 1e3
-    away, nearest = cKDTree(middle).query(np.stack([x, y], axis=1))
+    nearest = cKDTree(middle).query(np.stack([x, y], axis=1))[1]
     tangent = np.gradient(middle, axis=0)[nearest]
     tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
     offset = np.stack([x, y], axis=1) - middle[nearest]
@@ -190,7 +196,7 @@ def _brows(skin: Field, ground: Ground) -> Field:
     depth = 1 - np.abs(across) / half[nearest]
     ends = smoothstep(-2.5, 7.0, along) * smoothstep(length + 1.5, length - 6, along)
     body = smoothstep(-0.45, 0.55, depth + 0.55 * hairs) * ends
-    cover = body * (0.72 + 0.28 * smoothstep(-0.5, 0.5, hairs)) * ground.brows
+    cover = body * (0.72 + 0.28 * smoothstep(-0.5, 0.5, hairs)) * ground.outside
     return blend(skin, np.array(BROW) * (1 + 0.2 * hairs)[:, None], 0.88 * cover)
 
 

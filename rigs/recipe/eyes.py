@@ -1,4 +1,6 @@
-"""The eyeballs: two spheres with a cornea, turned by the joints ``eyeLeft`` and ``eyeRight`` and by the ``eyeLook...`` shapes."""
+"""The eyeballs: two spheres with a cornea, turned by the joints ``eyeLeft`` and ``eyeRight`` and by the ``eyeLook...``
+shapes.
+"""
 
 from __future__ import annotations
 

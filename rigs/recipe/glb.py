@@ -1,6 +1,7 @@
 """Write the parts as one binary glTF 2.0 file: a skinned mesh with sparse morph targets and embedded pictures.
 
-The same input gives the same bytes. Reference: glTF 2.0 specification, sections 3.6 (accessors), 3.7.2.2 (morph targets), 4.4 (GLB).
+The same input gives the same bytes. Reference: glTF 2.0 specification, sections 3.6 (accessors), 3.7.2.2 (morph
+targets), 4.4 (GLB).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from rigs.recipe.part import Part
+    from rigs.recipe.skeleton import Skeleton
 
 FLOAT, UINT, USHORT, UBYTE = 5126, 5125, 5123, 5121
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -32,16 +34,6 @@ class Look:
     picture: bytes
     roughness: float
     double_sided: bool = False
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Skeleton:
-    """Joints with parents before children; every rest rotation is the identity."""
-
-    names: tuple[str, ...]
-    parents: tuple[int, ...]
-    positions: NDArray[np.float64]
-    """(J, 3) [m], ``rig``."""
 
 
 @dataclass(slots=True)
@@ -160,13 +152,13 @@ def _primitive(writer: _Writer, part: Part, material: int, shapes: tuple[str, ..
 
 
 def _unit(normals: NDArray[np.float64]) -> NDArray[np.float32]:
-    single: NDArray[np.float32] = normals.astype("<f4")
-    return (single / np.linalg.norm(single, axis=1, keepdims=True)).astype("<f4")
+    single = normals.astype("<f4")
+    return np.asarray(single / np.linalg.norm(single, axis=1, keepdims=True), dtype="<f4")
 
 
 def _weights(weights: NDArray[np.float64]) -> NDArray[np.float32]:
-    single: NDArray[np.float32] = weights.astype("<f4")
-    return (single / single.sum(axis=1, keepdims=True)).astype("<f4")
+    single = weights.astype("<f4")
+    return np.asarray(single / single.sum(axis=1, keepdims=True), dtype="<f4")
 
 
 def _material(writer: _Writer, name: str, look: Look) -> None:

@@ -1,4 +1,6 @@
-"""Lashes: single hairs as slim opaque triangles, standing on MakeHuman's lash strips, which the blink shapes turn with the lids."""
+"""Lashes: single hairs as slim opaque triangles, standing on MakeHuman's lash strips, which the blink shapes turn with
+the lids.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def strip_grid(quads: NDArray[np.intp], root_distance: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The vertices of a strip of quads as a grid (rows, columns); row 0 is the long side of smallest `root_distance` (V,)."""
+    """The vertices of a strip of quads as a grid (rows, columns); row 0 is the long side of smallest `root_distance`
+    (V,).
+    """
     neighbours: dict[int, set[int]] = {}
     uses = np.bincount(quads.ravel())
     for quad in quads.tolist():
@@ -47,7 +51,8 @@ def hairs(
 ) -> tuple[sparse.csr_array, NDArray[np.intp]]:
     """`count` hairs along a strip: weights (5 count, base) of the strip's vertices, and triangles (3 count, 3).
 
-    `length` is the part of the strip's width that the longest hair covers; the hairs bend outwards towards the outer corner.
+    `length` is the part of the strip's width that the longest hair covers; the hairs bend outwards towards the outer
+    corner.
     """
     columns = grid.shape[1] - 1
     rows, weights = [], []
@@ -62,7 +67,7 @@ def hairs(
             weights.append(across * reach * (grid.shape[0] - 1))
     lift = _interpolate(grid, np.array(weights), np.array(rows), base)
     first = 5 * np.arange(count)[:, None]
-    triangles = np.concatenate([first + [0, 1, 3], first + [0, 3, 2], first + [2, 3, 4]], axis=0)
+    triangles = np.concatenate([first + np.array(hair) for hair in ((0, 1, 3), (0, 3, 2), (2, 3, 4))])
     return lift, triangles
 
 
@@ -70,7 +75,9 @@ def _interpolate(
     grid: NDArray[np.intp], row: NDArray[np.float64], column: NDArray[np.float64], base: int
 ) -> sparse.csr_array:
     """Bilinear weights (N, base) at fractional grid places."""
-    r, c = (np.minimum(place.astype(np.intp), size - 2) for place, size in ((row, grid.shape[0]), (column, grid.shape[1])))
+    r, c = (
+        np.minimum(place.astype(np.intp), size - 2) for place, size in ((row, grid.shape[0]), (column, grid.shape[1]))
+    )
     fr, fc = row - r, column - c
     corners = [grid[r, c], grid[r, c + 1], grid[r + 1, c], grid[r + 1, c + 1]]
     shares = [(1 - fr) * (1 - fc), (1 - fr) * fc, fr * (1 - fc), fr * fc]

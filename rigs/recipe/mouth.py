@@ -1,7 +1,8 @@
 """Teeth and gums along two dental arches, and the tongue.
 
-Widths of the teeth are the usual anatomical means (Wheeler's Dental Anatomy, tables of crown dimensions). Teeth and tongue share one picture: teeth in its upper half, from the midline (left)
-to the last molar (right), the tongue in its lower half.
+Widths of the teeth are the usual anatomical means (Wheeler's Dental Anatomy, tables of crown dimensions). Teeth and
+tongue share one picture: teeth in its upper half, from the midline (left) to the last molar (right), the tongue in its
+lower half.
 """
 
 from __future__ import annotations
@@ -111,7 +112,9 @@ def picture_edges() -> NDArray[np.float64]:
 def tongue(
     positions: NDArray[np.float64], triangles: NDArray[np.intp], joint: int, shapes: dict[str, NDArray[np.float64]]
 ) -> Part:
-    """The tongue (V, 3) [m], root at the back, with its share of the picture; lies flatter than MakeHuman's, but comes out as high."""
+    """The tongue (V, 3) [m], root at the back, with its share of the picture; lies flatter than MakeHuman's, but comes
+    out as high.
+    """
     root = np.array([0.0, positions[:, 1].min(), positions[:, 2].min()])
     lowered = root + (positions - root) * TONGUE_SCALE + TONGUE_SHIFT_M
     out = np.linalg.norm(shapes["tongueOut"], axis=1, keepdims=True)

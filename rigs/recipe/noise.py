@@ -1,4 +1,6 @@
-"""Smooth random fields in space, the same on every machine: lattice values blended by a cubic step (Perlin's value noise)."""
+"""Smooth random fields in space, the same on every machine: lattice values blended by a cubic step (Perlin's value
+noise).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""How open each vertex lies to the light from all around: depth maps from many directions, compared with the vertex's own depth."""
+"""How open each vertex lies to the light from all around: depth maps from many directions, compared with the vertex's
+own depth.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ BIAS_M = 0.0012
 def openness(
     positions: NDArray[np.float64], triangles: NDArray[np.intp], normals: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(V,) in [0, 1]: the share of the light from above its own horizon, weighted by the cosine, that reaches each vertex."""
+    """(V,) in [0, 1]: the share of the light from above its own horizon, weighted by the cosine, that reaches each
+    vertex.
+    """
     received, possible = np.zeros(len(positions)), np.zeros(len(positions))
     for light in _sphere(DIRECTIONS):
         cosine = np.maximum(normals @ light, 0)
@@ -47,7 +51,9 @@ def _sphere(count: int) -> NDArray[np.float64]:
     return np.stack([radius * np.cos(turn), height, radius * np.sin(turn)], axis=1)
 
 
-def _lit(positions: NDArray[np.float64], triangles: NDArray[np.intp], light: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lit(
+    positions: NDArray[np.float64], triangles: NDArray[np.intp], light: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """(V,) 1 where the light from direction `light` reaches the vertex, else 0."""
     side = np.cross(light, [0.0, 1.0, 0.0] if abs(light[1]) < 0.9 else [1.0, 0.0, 0.0])
     side /= np.linalg.norm(side)
@@ -62,7 +68,7 @@ def _lit(positions: NDArray[np.float64], triangles: NDArray[np.intp], light: NDA
         np.maximum.at(nearest, (cell[:, 0], cell[:, 1]), np.einsum("s,fs->f", share, depth[triangles]))
     nearest = ndimage.grey_closing(nearest, size=(3, 3))
     cell = ((flat - low) / PIXEL_M).round().astype(int)
-    return (nearest[cell[:, 0], cell[:, 1]] < depth + BIAS_M).astype(float)
+    return np.asarray(nearest[cell[:, 0], cell[:, 1]] < depth + BIAS_M, dtype=float)
 
 
 def _barycentric_samples(steps: int) -> NDArray[np.float64]:

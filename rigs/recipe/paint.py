@@ -35,7 +35,7 @@ class Canvas:
         whole = np.zeros((*self.covered.shape, 3))
         whole[self.covered] = colours
         rows, columns = ndimage.distance_transform_edt(~self.covered, return_distances=False, return_indices=True)
-        return np.clip(whole[rows, columns] + 0.5, 0, 255).astype(np.uint8)
+        return np.asarray(np.clip(whole[rows, columns] + 0.5, 0, 255), dtype=np.uint8)
 
 
 def canvas(uv: NDArray[np.float64], size: int) -> Canvas:
@@ -69,7 +69,9 @@ def look_up(picture: NDArray[np.float64], uv: NDArray[np.float64]) -> NDArray[np
     return np.asarray(ndimage.map_coordinates(picture, [rows, columns], order=1, mode="nearest"))
 
 
-def smoothstep(low: float, high: float, value: NDArray[np.float64]) -> NDArray[np.float64]:
+def smoothstep(
+    low: float | NDArray[np.float64], high: float | NDArray[np.float64], value: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """0 up to `low`, 1 from `high` on, smooth between; falls where `low` > `high`."""
     t = np.clip((value - low) / (high - low), 0, 1)
     return np.asarray(t * t * (3 - 2 * t))

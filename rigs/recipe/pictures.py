@@ -29,8 +29,7 @@ TONGUE = (186.0, 96.0, 94.0)
 def eye() -> NDArray[np.uint8]:
     """(H, W, 3): the distance from the middle is the angle from the front, the edge is the last ring of the sphere."""
     grid = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE * 2 - 1
-    x, y = np.meshgrid(grid, -grid)
-    x, y = x.ravel(), y.ravel()
+    x, y = (values.ravel() for values in np.meshgrid(grid, -grid))
     angle = np.hypot(x, y) * RINGS_DEG[-1]
     colour = _sclera(x, y, angle)
     colour = _iris(colour, x, y, angle)
@@ -73,10 +72,12 @@ def _iris(
 
 
 def mouth() -> NDArray[np.uint8]:
-    """(H, W, 3): above, the teeth from the midline (left) to the last molar, gum on top; below, the tongue from root (left) to tip."""
+    """(H, W, 3): above, the teeth from the midline (left) to the last molar, gum on top; below, the tongue from root
+    (left) to tip.
+    """
     size = MOUTH_SIZE
-    x, y = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size)
-    x, y = x.ravel(), y.ravel()
+    grid = (np.arange(size) + 0.5) / size
+    x, y = (values.ravel() for values in np.meshgrid(grid, grid))
     strip = _teeth(x, 2 * y)
     return _finish(np.where((y < 0.5)[:, None], strip, _tongue(x, 2 * y - 1)), size, size)
 
@@ -94,7 +95,7 @@ def _teeth(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64
     margin = CREST + 0.10 * (1 - aside**2) - 0.10
     gum = np.array(GUM) * (1 + 0.05 * value_noise(np.stack([x, y, 0 * x], axis=1), 0.03, seed=3))[:, None]
     colour = blend(colour, gum, smoothstep(margin + 0.025, margin - 0.01, y))
-    return np.asarray(colour * (1 - 0.55 * smoothstep(0.25, 1.0, x))[:, None])
+    return np.asarray(colour * (1 - 0.72 * smoothstep(0.22, 0.75, x))[:, None])
 
 
 def _tongue(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """Split the long edges of the skin, so that the skull is round in profile, and give the hair some thickness.
 
-The new vertex of an edge lies on the cubic curve that the normals of its ends ask for: Vlachos, Peters, Boyd, Mitchell: Curved PN
-Triangles, I3D 2001, section 3.
+The new vertex of an edge lies on the cubic curve that the normals of its ends ask for: Vlachos, Peters, Boyd,
+Mitchell: Curved PN Triangles, I3D 2001, section 3.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
     from rigs.recipe.skin import Skin
 
+UNSPLIT = -1
+
 
 def refine(skin: Skin, base: NDArray[np.float64], longest_m: float) -> Skin:
     """Split every edge longer than `longest_m`, but none of the rim, once."""
@@ -31,9 +33,9 @@ def refine(skin: Skin, base: NDArray[np.float64], longest_m: float) -> Skin:
     triangles: list[list[int]] = []
     uv: list[list[NDArray[np.float64]]] = []
     for triangle, corners in zip(skin.triangles.tolist(), skin.uv, strict=True):
-        middles = [number.get(_sorted(triangle[k], triangle[(k + 1) % 3])) for k in range(3)]
-        for pattern in _pattern([middle is not None for middle in middles]):
-            triangles.append([triangle[k] if k < 3 else middles[k - 3] or 0 for k in pattern])
+        middles = [number.get(_sorted(triangle[k], triangle[(k + 1) % 3]), UNSPLIT) for k in range(3)]
+        for pattern in _pattern([middle != UNSPLIT for middle in middles]):
+            triangles.append([(triangle + middles)[k] for k in pattern])
             uv.append([_corner(corners, k) for k in pattern])
     half = sparse.csr_array(
         (np.full(2 * len(split), 0.5), (np.arange(len(split)).repeat(2), split.ravel())), (len(split), len(positions))
@@ -50,7 +52,7 @@ def _sorted(a: int, b: int) -> tuple[int, int]:
 
 
 def _corner(corners: NDArray[np.float64], k: int) -> NDArray[np.float64]:
-    return corners[k] if k < 3 else (corners[k - 3] + corners[(k - 2) % 3]) / 2
+    return np.asarray(corners[k] if k < 3 else (corners[k - 3] + corners[(k - 2) % 3]) / 2)
 
 
 def _pattern(split: list[bool]) -> list[tuple[int, int, int]]:
@@ -62,7 +64,7 @@ def _pattern(split: list[bool]) -> list[tuple[int, int, int]]:
         return [(0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)]
     turn = split.index(True) if count == 1 else (split.index(False) + 1) % 3
     first = [(0, 3, 2), (3, 1, 2)] if count == 1 else [(3, 1, 4), (0, 3, 4), (0, 4, 2)]
-    return [tuple(_turned(k, turn) for k in triangle) for triangle in first]  # type: ignore[misc]
+    return [(_turned(a, turn), _turned(b, turn), _turned(c, turn)) for a, b, c in first]
 
 
 def _turned(k: int, turn: int) -> int:

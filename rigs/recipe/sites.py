@@ -1,6 +1,7 @@
 """Where the facial joints stand: one vertex of the base mesh for each site, and the right side by its mirror image.
 
-The places are those of a mocap supervisor's markers; they hold for every identity, because the base mesh keeps its topology.
+The places are those of a mocap supervisor's markers; they hold for every identity, because the base mesh keeps its
+topology.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ MIDDLE = {
 }
 JAW_RIDERS = ("lipLower", "chin", "mandible")
 """Beginnings of the names of the sites whose joints are children of the jaw."""
+
+
+def other_side(site: str) -> str:
+    """The site on the right for one on the left."""
+    return site.replace("Left", "Right")
 
 
 def rides_jaw(site: str) -> bool:

@@ -1,7 +1,7 @@
 """Cut the head out of the body along a plane through the neck, and close it with a rounded, flat base.
 
-Every vertex of the result is a weighted mean of base vertices plus a fixed offset, so that anything known on the base mesh (bone
-weights, shape targets) carries over by one sparse product. Units: metres, frame of the base mesh.
+Every vertex of the result is a weighted mean of base vertices plus a fixed offset, so that anything known on the base
+mesh (bone weights, shape targets) carries over by one sparse product. Units: metres, frame of the base mesh.
 """
 
 from __future__ import annotations
@@ -55,7 +55,9 @@ def cut_head(
     corner_uv: NDArray[np.float64],
     plane: tuple[NDArray[np.float64], NDArray[np.float64]],
 ) -> Skin:
-    """The part of the mesh on the positive side of `plane` (point, unit normal) that holds the highest vertex, open below."""
+    """The part of the mesh on the positive side of `plane` (point, unit normal) that holds the highest vertex, open
+    below.
+    """
     split = triangulate(quads, vertices)
     triangles = np.take_along_axis(quads[:, None, :], split, axis=2).reshape(-1, 3)
     uv = corner_uv[np.arange(len(quads))[:, None, None], split].reshape(-1, 3, 2)
@@ -105,7 +107,7 @@ class _Cut:
         share = self.side[pairs[:, 0]] / (self.side[pairs[:, 0]] - self.side[pairs[:, 1]])
         rows = np.arange(len(pairs)).repeat(2)
         new = sparse.csr_array((np.c_[1 - share, share].ravel(), (rows, pairs.ravel())), shape=(len(pairs), count))
-        return sparse.vstack([sparse.eye_array(count), new], format="csr")
+        return sparse.csr_array(sparse.vstack([sparse.eye_array(count), new]))
 
 
 def _compact(cut: _Cut, vertices: NDArray[np.float64], offset: NDArray[np.float64]) -> Skin:
@@ -128,7 +130,7 @@ def boundary_edges(triangles: NDArray[np.intp]) -> NDArray[np.intp]:
     """(E, 2) edges that belong to one triangle only, in the direction of that triangle."""
     edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     _, index, counts = np.unique(np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True)
-    return edges[index[counts == 1]]
+    return np.asarray(edges[index[counts == 1]])
 
 
 def _loop(edges: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -1,9 +1,10 @@
 """Smooth skin weights over a surface: bounded biharmonic weights.
 
-For every handle h the field w_h minimises the bending energy |Laplace w_h|^2 with 0 <= w_h <= bound and given values at the handles,
-so that the skin follows a handle fully where it stands and blends without a crease to its neighbours. Distances are those along the
-surface: the upper lip is far from the lower one. Jacobson, Baran, Popovic, Sorkine: Bounded Biharmonic Weights for Real-Time
-Deformation, SIGGRAPH 2011, eq. 1 to 4; solved by the alternating direction method of multipliers (Boyd et al. 2011, section 5.2).
+For every handle h the field w_h minimises the bending energy |Laplace w_h|^2 with 0 <= w_h <= bound and given values
+at the handles, so that the skin follows a handle fully where it stands and blends without a crease to its neighbours.
+Distances are those along the surface: the upper lip is far from the lower one. Jacobson, Baran, Popovic, Sorkine:
+Bounded Biharmonic Weights for Real-Time Deformation, SIGGRAPH 2011, eq. 1 to 4; solved by the alternating direction
+method of multipliers (Boyd et al. 2011, section 5.2).
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ def bounded_biharmonic(
 ) -> NDArray[np.float64]:
     """Weights (V, H), rows add up to 1.
 
-    `positions` (V, 3) [m]; `given` (V, H) holds the weights of the vertices that are handles and NaN rows elsewhere; `bound` (V, H)
-    is the largest weight allowed, 0 where a handle must not reach.
+    `positions` (V, 3) [m]; `given` (V, H) holds the weights of the vertices that are handles and NaN rows elsewhere;
+    `bound` (V, H) is the largest weight allowed, 0 where a handle must not reach.
     """
     stiffness, area = cotangent_laplacian(positions * CENTIMETRES_PER_METRE, triangles)
     energy = (stiffness @ sparse.diags_array(1 / area) @ stiffness).tocsr()
@@ -91,8 +92,8 @@ def surface_distance(
 def strongest(weights: NDArray[np.float64], count: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     """The `count` largest weights of each row as (joints, weights), each (V, count), rows add up to 1.
 
-    The first weight that is left out is subtracted from those kept, so that the result stays continuous where two weights change
-    places.
+    The first weight that is left out is subtracted from those kept, so that the result stays continuous where two
+    weights change places.
     """
     order = np.argsort(-weights, axis=1, kind="stable")[:, : count + 1]
     values = np.take_along_axis(weights, order, axis=1)
