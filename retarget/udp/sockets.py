@@ -15,6 +15,7 @@ import struct
 import sys
 import time
 from dataclasses import dataclass
+from enum import Enum
 from ipaddress import IPv4Address, ip_address
 from typing import TYPE_CHECKING
 
@@ -33,12 +34,31 @@ RECEIVE_BUFFER = 4 << 20
 
 _LINUX = sys.platform == "linux"
 _SO_TIMESTAMPNS, _SO_RXQ_OVFL, _IP_MULTICAST_ALL = 35, 40, 49  # linux: asm-generic/socket.h, linux/in.h
+_IP_RECVERR, _SIOCGIFADDR = 11, 0x8915  # linux: linux/in.h, linux/sockios.h
+_IFREQ = struct.Struct("16s4x4s16x")
 _ANCILLARY_BYTES = 128
 _TIMESPEC = struct.Struct("@qq")
 _COUNT = struct.Struct("@I")
 _OLDEST_STAMP_S = 10.0
 _GONE = {errno.ECONNREFUSED, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN}
 _FULL = {errno.EAGAIN, errno.ENOBUFS, errno.EPERM}
+
+
+class Refusal(Enum):
+    """What the network answers for a peer that cannot be had (ICMP destination unreachable, RFC 792)."""
+
+    PORT = "port"
+    """The machine is there and no program has the port."""
+    HOST = "host"
+    """No machine has the address, or a firewall on the way says that it must not be reached."""
+
+
+_REFUSALS = {
+    errno.ECONNREFUSED: Refusal.PORT,
+    errno.EHOSTUNREACH: Refusal.HOST,
+    errno.ENETUNREACH: Refusal.HOST,
+    errno.EACCES: Refusal.HOST,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +224,41 @@ def local_address_towards(host: str) -> str:
                 f"No network leads to {host}: {_reason(error)}. Check the cable and the address."
             ) from error
         return str(probe.getsockname()[0])
+
+
+def refusal(payload: bytes, peer: Address, local: str, wait_s: float) -> Refusal | None:
+    """Send `payload` to `peer` and return what the network says against it.
+
+    None when the peer answers, or nothing is heard within `wait_s` [s]. Systems other than Linux tell only of a port.
+    """
+    with _udp_socket() as probe:
+        _bind(probe, (local, 0))
+        if _LINUX:
+            probe.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
+        try:
+            probe.connect(peer)  # the kernel hands ICMP on only to a socket that has one peer
+            probe.send(payload)
+        except OSError as error:
+            return _REFUSALS.get(error.errno or 0)
+        waiting = select.poll()
+        waiting.register(probe, select.POLLIN)
+        waiting.poll(math.ceil(1e3 * wait_s))
+        return _REFUSALS.get(probe.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR))
+
+
+def local_addresses() -> list[str]:
+    """IPv4 addresses of this machine, one for each network card (Linux; elsewhere none)."""
+    if not _LINUX:
+        return []
+    import fcntl
+
+    found = []
+    with _udp_socket() as asking:
+        for _, name in socket.if_nameindex():
+            with contextlib.suppress(OSError):  # a card without an address
+                answer = fcntl.ioctl(asking, _SIOCGIFADDR, _IFREQ.pack(name.encode(), bytes(4)))
+                found.append(socket.inet_ntoa(_IFREQ.unpack(answer)[1]))
+    return found
 
 
 def broadcast_address(local: str) -> str:

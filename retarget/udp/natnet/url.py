@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from ipaddress import IPv4Address
+from typing import TYPE_CHECKING
 from urllib.parse import parse_qsl, urlsplit
 
 from retarget.errors import InputError, ProtocolError
 from retarget.udp.natnet.version import Bitstream, parse_bitstream
+
+if TYPE_CHECKING:
+    from retarget.udp.natnet.messages import ConnectionInfo
 
 COMMAND_PORT = 1510
 DATA_PORT = 1511
@@ -33,6 +37,14 @@ class NatNetUrl:
     data_port: int | None = None
     """Port of the group in place of the announced one."""
     bitstream: Bitstream = DEFAULT_BITSTREAM
+
+    def group_for(self, announced: ConnectionInfo | None) -> tuple[str, int] | None:
+        """Group and port to listen to, given what the server announces; None where frames come to each client."""
+        if not (self.multicast or (announced is not None and announced.is_multicast)):
+            return None
+        group = self.group or (announced.group if announced is not None else MULTICAST_GROUP)
+        port = self.data_port or (announced.data_port if announced is not None and announced.data_port else DATA_PORT)
+        return (MULTICAST_GROUP if group == "0.0.0.0" else group), port  # noqa: S104 - a 2.x server's empty field
 
     def __str__(self) -> str:
         return f"natnet://{self.host or ''}" + ("" if self.port == COMMAND_PORT else f":{self.port}")
