@@ -88,9 +88,18 @@ def _regions(skin: Skin, person: Person) -> Regions:
         only[skin.triangles[island]] = True
         only[skin.triangles[~island]] = False
         within[name] = only
-    blinks = {side: skin.lift @ person.units[f"eyeBlink{side}"] for side in ("Left", "Right")}
+    blinks = {side: skin_offsets(skin, person, f"eyeBlink{side}") for side in ("Left", "Right")}
     lids = {f"lidUpper{side}": np.linalg.norm(offsets, axis=1) for side, offsets in blinks.items()}
     return Regions(within["mouth"], within["socketLeft"] | within["socketRight"], lids)
+
+
+def skin_offsets(skin: Skin, person: Person, unit: str) -> NDArray[np.float64]:
+    """Offsets (V, 3) [m] of a face unit; eye units also stir palate and other eye, which is undone."""
+    offsets = np.asarray(skin.lift @ person.units[unit])
+    if unit.startswith("eye"):
+        found = islands(skin.uv)
+        offsets[skin.triangles[found["mouth"] | found["socketRight" if unit.endswith("Left") else "socketLeft"]]] = 0
+    return offsets
 
 
 def _shut(skin: Skin, binding: Binding) -> Skin:
@@ -111,7 +120,7 @@ def skin_part(face: Face, person: Person, skeleton: Skeleton, lip_mask: NDArray[
     vertex = unique[:, 0].astype(int)
     joints, weights = rig_influences(face.binding, skeleton)
     loose = _loose(face, positions, lip_mask)
-    shapes = {name: iron(skin.lift @ offsets, skin.triangles, loose)[vertex] for name, offsets in person.units.items()}
+    shapes = {unit: iron(skin_offsets(skin, person, unit), skin.triangles, loose)[vertex] for unit in person.units}
     triangles = index.reshape(-1, 3)
     uv = unique[:, 1:]
     return Part("skin", positions[vertex], normals[vertex], uv, triangles, joints[vertex], weights[vertex], shapes)
