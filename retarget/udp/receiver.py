@@ -10,6 +10,7 @@ import os
 import threading
 import time
 from collections import deque
+from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from retarget.udp.datagram import Datagram
@@ -25,6 +26,7 @@ Channel = Literal["command", "data"]
 _KEPT_MESSAGES = 256
 _BURST = 256  # datagrams taken from one socket before the others are looked at
 _LONGEST_WAIT_S = 0.5
+_LONGEST_FAREWELL_S = 5.0
 
 
 class Arrival(NamedTuple):
@@ -39,64 +41,60 @@ class Arrival(NamedTuple):
 class Inbox:
     """A bounded queue between two threads in which the newest frames win.
 
-    `capacity` counts everything that waits; frames that had to go are counted in `dropped`.
+    `capacity` counts everything that waits; frames that had to go are counted in `dropped`. There is no lock that one
+    thread could hold while the other ends it: also a signal's function may `close` it.
     """
 
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
-        self._waiting: deque[Arrival] = deque()
+        self._waiting: SimpleQueue[Arrival | None] = SimpleQueue()  # None only wakes the reader
         self._rescued: deque[Arrival] = deque(maxlen=_KEPT_MESSAGES)  # all older than what waits
-        self._changed = threading.Condition()
         self._failure: BaseException | None = None
         self._closed = False
         self.dropped = 0
-
-    def put(self, arrival: Arrival) -> None:
-        """Add the newest."""
-        with self._changed:
-            if len(self._waiting) >= self._capacity:
-                self._make_room()
-            self._waiting.append(arrival)
-            self._changed.notify()
-
-    def get(self, timeout_s: float) -> Arrival | None:
-        """Take the oldest; None after `timeout_s` [s] or once closed. Raises what the receiver failed with."""
-        with self._changed:
-            if not self._ready() and timeout_s > 0.0:
-                self._changed.wait_for(self._ready, timeout_s)
-            if self._rescued:
-                return self._rescued.popleft()
-            if self._waiting:
-                return self._waiting.popleft()
-            if self._failure is not None:
-                raise self._failure
-            return None
-
-    def fail(self, failure: BaseException) -> None:
-        """Let the reader know that nothing more will come, once it has read what waits."""
-        with self._changed:
-            self._failure = failure
-            self._changed.notify_all()
-
-    def close(self) -> None:
-        """Let a waiting reader go."""
-        with self._changed:
-            self._closed = True
-            self._changed.notify_all()
 
     @property
     def closed(self) -> bool:
         """Whether the reader should stop."""
         return self._closed
 
-    def _ready(self) -> bool:
-        return bool(self._waiting or self._rescued or self._closed or self._failure)
+    def put(self, arrival: Arrival) -> None:
+        """Add the newest."""
+        if self._waiting.qsize() >= self._capacity:
+            self._make_room()
+        self._waiting.put(arrival)
+
+    def get(self, timeout_s: float) -> Arrival | None:
+        """Take the oldest; None after `timeout_s` [s] or once closed. Raises what the receiver failed with."""
+        try:
+            return self._rescued.popleft()
+        except IndexError:
+            arrival = self._take(0.0 if self._closed or self._failure is not None else timeout_s)
+        if arrival is None and self._failure is not None:
+            raise self._failure
+        return arrival
+
+    def fail(self, failure: BaseException) -> None:
+        """Let the reader know that nothing more will come, once it has read what waits."""
+        self._failure = failure
+        self._waiting.put(None)
+
+    def close(self) -> None:
+        """Let a waiting reader go."""
+        self._closed = True
+        self._waiting.put(None)
+
+    def _take(self, timeout_s: float) -> Arrival | None:
+        try:
+            return self._waiting.get(block=timeout_s > 0.0, timeout=timeout_s)
+        except Empty:
+            return None
 
     def _make_room(self) -> None:
-        oldest = self._waiting.popleft()
-        if oldest.is_frame:
+        oldest = self._take(0.0)
+        if oldest is not None and oldest.is_frame:
             self.dropped += 1
-        else:
+        elif oldest is not None:
             self._rescued.append(oldest)
 
 
@@ -135,8 +133,7 @@ class Receiver:
             return
         self._closing = True
         os.write(self._waker, b"x")
-        if threading.current_thread() is not self._thread:
-            self._thread.join()
+        self._thread.join(_LONGEST_FAREWELL_S)  # a tap may hang on its disk
         os.close(self._waker)
         os.close(self._woken)
 

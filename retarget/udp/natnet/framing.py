@@ -56,7 +56,7 @@ class Framing:
 
     def frame(self, data: FrameOfData, received_s: float) -> MarkerFrame | None:
         """Make a frame of what arrived at `received_s` [s]; None when it came again, or after newer ones."""
-        arrival = self._sequence.judge(data.number)
+        arrival = self._sequence.judge(data.number, data.ticks.transmit if data.ticks is not None else 0)
         if arrival in {Arrival.DOUBLED, Arrival.LATE}:
             self.doubled += arrival is Arrival.DOUBLED
             self.late += arrival is Arrival.LATE

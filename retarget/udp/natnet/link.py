@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from retarget.udp.datagram import Datagram
 from retarget.udp.natnet.codec import encode
-from retarget.udp.natnet.messages import KeepAlive, MessageId
+from retarget.udp.natnet.messages import Disconnect, KeepAlive, MessageId
 from retarget.udp.receiver import Inbox, Receiver
 from retarget.udp.sockets import open_multicast_receiver, open_udp
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 _KEEP_ALIVE = encode(KeepAlive())
 _KEEP_ALIVE_S = 1.0
+_FAREWELL = encode(Disconnect())
 _FRAME = int(MessageId.FRAMEOFDATA).to_bytes(2, "little")
 
 
@@ -105,9 +106,16 @@ class Link:
         self._group = group
         self._receiver = self._listen()
 
-    def close(self) -> None:
-        """Stop the thread and give the ports back; a waiting reader returns."""
+    def stop(self) -> None:
+        """Let a waiting reader return; nothing is torn down, so a signal's function may call it."""
         self._inbox.close()
+
+    def close(self) -> None:
+        """Say goodbye, stop the thread and give the ports back; a waiting reader returns."""
+        self._inbox.close()
+        if self._sockets["command"].fileno() < 0:
+            return
+        self.send(_FAREWELL)
         self._stop_listening()
         for each in self._sockets.values():
             each.close()

@@ -13,7 +13,8 @@ How a marker's name is found, the first that applies:
    an unlabelled point: its id changes after each loss and would be a new name every time.
 
 A set without labelled markers is read from the frame's marker sets, where exactly (0, 0, 0) means not seen. Labelled
-markers are seen unless flagged as occluded or model-filled, or their residual is negative or not a number.
+markers are seen unless flagged as occluded or model-filled, or their residual is negative or not a number; those of 2.5
+have no flags, and there (0, 0, 0) means not seen too.
 """
 
 from __future__ import annotations
@@ -239,9 +240,12 @@ class _Search:
 
 def _seen(markers: LabelledMarkers) -> NDArray[np.bool_]:
     """(n,): measured in this frame."""
-    residuals = markers.residuals
-    believed = (residuals >= 0) | ("residual" not in (markers.table.dtype.names or ()))
-    seen: NDArray[np.bool_] = markers.measured & believed & np.isfinite(markers.positions).all(axis=1)
+    fields = markers.table.dtype.names or ()
+    seen = markers.measured & np.isfinite(markers.positions).all(axis=1)
+    if "residual" in fields:
+        seen &= markers.residuals >= 0
+    if "params" not in fields:
+        seen &= (markers.positions != 0).any(axis=1)
     return seen
 
 

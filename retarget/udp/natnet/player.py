@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 _LONGEST_WAIT_S = 0.5
 _GRACE_S = 2.0
 _SETTLE_S = 0.1
-_FAREWELL_S = 0.3
-_FAREWELLS, _FAREWELL_STEP_S = 3, 0.05
+_FAREWELL_S = 0.2
+_FAREWELLS, _FAREWELL_STEP_S = 3, 0.02
 
 
 class Begin(Enum):
@@ -102,8 +102,8 @@ class Player:
         with self._changed:
             while not self._stopping and not self._may_begin():
                 self._changed.wait(_SETTLE_S)
-            if self._begin is Begin.WITH_FIRST_CLIENT and not self._stopping:
-                self._changed.wait(_SETTLE_S)  # the definitions are on their way
+            if self._begin is Begin.WITH_FIRST_CLIENT:  # the definitions are on their way
+                self._changed.wait_for(lambda: self._stopping, _SETTLE_S)
 
     def _may_begin(self) -> bool:
         return self._begin is Begin.AT_ONCE or self._clients.anyone_ready(time.monotonic(), _GRACE_S)
@@ -162,8 +162,7 @@ class Player:
     def _take_leave(self) -> None:
         """Tell the end, several times as datagrams get lost, and after the last frame arrived."""
         with self._changed:
-            if not self._stopping:
-                self._changed.wait(_FAREWELL_S)
+            self._changed.wait_for(lambda: self._stopping, _FAREWELL_S)
             listeners = set(self._clients.addresses())
         farewell = encode(Disconnect())
         for _ in range(_FAREWELLS):

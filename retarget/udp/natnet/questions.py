@@ -23,7 +23,7 @@ FRAME_RATE = "FrameRate"
 MILLIMETRES = "UnitsToMillimeters"
 
 _PATIENCE_S = 0.4
-_QUIET_S = 1.0
+_QUIET_S = 0.3
 
 
 @dataclass(slots=True)

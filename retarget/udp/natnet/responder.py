@@ -48,9 +48,9 @@ class Responder:
     def __init__(
         self, reel: Reel, playback: Playback, bitstream: Bitstream, connection: ConnectionInfo, rate_hz: float
     ) -> None:
-        self._reel = reel
+        self.reel = reel
         self._playback = playback
-        self._bitstream = require_known(bitstream)
+        self.bitstream = require_known(bitstream)
         self._connection = connection
         self._rate_hz = rate_hz
         self._strangers = Allowance()
@@ -77,11 +77,11 @@ class Responder:
     def definitions(self, bitstream: Bitstream) -> bytes:
         """The model definitions in one bitstream, written once."""
         if bitstream not in self._definitions:
-            self._definitions[bitstream] = encode(self._reel.definitions, bitstream)
+            self._definitions[bitstream] = encode(self.reel.definitions, bitstream)
         return self._definitions[bitstream]
 
     def _reply(self, message: Message, peer: Address, client: Client | None, now_s: float) -> bytes | None:
-        bitstream = client.bitstream if client is not None else self._bitstream
+        bitstream = client.bitstream if client is not None else self.bitstream
         match message:
             case Connect():
                 return self._connect(message, peer, now_s)
@@ -95,7 +95,7 @@ class Responder:
                 return self.definitions(bitstream)
             case RequestFrameOfData():
                 index = min(self._playback.index, self._playback.last)
-                return encode(self._reel.frame(index), bitstream)
+                return encode(self.reel.frame(index), bitstream)
             case EchoRequest():
                 return encode(EchoResponse(message.client_stamp, int(now_s * self._connection.clock_hz)))
             case Disconnect():
@@ -113,16 +113,16 @@ class Responder:
 
     def _chosen(self, connect: Connect) -> Bitstream:
         wanted = connect.options.bitstream if connect.options is not None else None
-        return self._agreed(wanted) if wanted is not None else self._bitstream
+        return self._agreed(wanted) if wanted is not None else self.bitstream
 
     def _agreed(self, wanted: Bitstream) -> Bitstream:
         """What a client gets that wants `wanted`."""
-        if self._bitstream < _CHOICE_SINCE or self._connection.is_multicast:
-            return self._bitstream
+        if self.bitstream < _CHOICE_SINCE or self._connection.is_multicast:
+            return self.bitstream
         try:
-            return min(require_known(wanted), self._bitstream)
+            return min(require_known(wanted), self.bitstream)
         except ProtocolError:
-            return self._bitstream
+            return self.bitstream
 
     def _server_info(self, bitstream: Bitstream) -> ServerInfo:
         sender = Sender.named("retarget", (0, 1, 0, 0), (*bitstream, 0, 0))
@@ -131,7 +131,7 @@ class Responder:
     def _on_request(
         self, request: Request, client: Client | None, bitstream: Bitstream
     ) -> Response | UnrecognizedRequest:
-        if request.command != "Bitstream" or self._bitstream < _CHOICE_SINCE:
+        if request.command != "Bitstream" or self.bitstream < _CHOICE_SINCE:
             return answer_request(request, self._playback, self._rate_hz * self._playback.speed)
         if not request.parameters:
             return Response.of_text(f"Bitstream,{bitstream}")

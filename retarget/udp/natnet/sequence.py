@@ -1,4 +1,9 @@
-"""What a stream's frame numbers tell: which frames were lost, which came twice, which came too late to be used."""
+"""What a stream's frame numbers tell: which frames were lost, which came twice, which came too late to be used.
+
+Numbers alone do not tell a frame that comes again from a take that is played again, a short one in a loop above all. The
+sender's clock does, from 3.0; without it, three frames in a row that are not new are taken to be another beginning, and
+many in a row in any case, as clocks start over too.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +11,7 @@ from enum import Enum
 
 _WINDOW = 64
 _LARGEST_GAP = 10_000
+_OLD_IN_A_ROW, _OLD_BY_THE_CLOCK = 3, 10
 
 
 class Arrival(Enum):
@@ -18,7 +24,7 @@ class Arrival(Enum):
     LATE = "late"
     """Overtaken by newer ones."""
     RESTARTED = "restarted"
-    """The numbers went far back or far ahead: the sender was restarted, rewound or looped; it is to be used."""
+    """The numbers went back or far ahead: the sender was restarted, rewound or looped; the frame is to be used."""
 
 
 class FrameSequence:
@@ -26,17 +32,33 @@ class FrameSequence:
 
     def __init__(self) -> None:
         self._last: int | None = None
+        self._last_stamp = 0
         self._seen = 0  # bit i: number `_last - i` arrived
+        self._old_in_a_row = 0
         self.lost = 0
         """Numbers passed over and not come since."""
 
-    def judge(self, number: int) -> Arrival:
-        """Tell how frame `number` stands, and count what it shows to be lost."""
+    def judge(self, number: int, stamp: int = 0) -> Arrival:
+        """Tell how frame `number` stands, and count what it shows to be lost.
+
+        `stamp` is when it left, by the sender's clock in any unit; 0 where it has none.
+        """
+        arrival = self._judge(number, stamp)
+        if arrival in {Arrival.NEXT, Arrival.RESTARTED}:
+            self._last_stamp = stamp
+            self._old_in_a_row = 0
+        return arrival
+
+    def restart(self) -> None:
+        """Expect any number next."""
+        self._last = None
+
+    def _judge(self, number: int, stamp: int) -> Arrival:
         if self._last is None:
             self._begin(number)
             return Arrival.NEXT
         step = number - self._last
-        if step > _LARGEST_GAP or step <= -_WINDOW:
+        if step > _LARGEST_GAP or step <= -_WINDOW or (step <= 0 and self._began_again(stamp)):
             self._begin(number)
             return Arrival.RESTARTED
         if step > 0:
@@ -46,9 +68,11 @@ class FrameSequence:
             return Arrival.NEXT
         return self._judge_recent(-step)
 
-    def restart(self) -> None:
-        """Expect any number next."""
-        self._last = None
+    def _began_again(self, stamp: int) -> bool:
+        self._old_in_a_row += 1
+        if stamp and self._last_stamp:
+            return stamp > self._last_stamp or self._old_in_a_row >= _OLD_BY_THE_CLOCK
+        return self._old_in_a_row >= _OLD_IN_A_ROW
 
     def _begin(self, number: int) -> None:
         self._last = number

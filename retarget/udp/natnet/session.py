@@ -52,6 +52,9 @@ if TYPE_CHECKING:
 SILENCE_S = 2.0
 """Without a frame for so long, the server is connected again [s]; a server that answers but rests is left more time."""
 
+PREPARE_S = 3.0
+"""For so long, frames wait for their names; then they are handed on with numbers for names [s]."""
+
 _LONGEST_SILENCE_S = 10.0
 _FAILURES_IN_A_ROW = 5
 _OBSERVED = {MessageId.REQUEST, MessageId.ECHOREQUEST}  # of what is sent, what an answer refers to
@@ -86,6 +89,8 @@ class NatNetSession:
         self._heard_s = math.inf  # the last frame, or the last time that a server was connected
         self._silence_s = SILENCE_S
         self._silent = False
+        self._met_s = math.inf
+        self._prepared = False
         self._failures_in_a_row = 0
         self._flags = 0
         self.phase = Phase.CONNECTING
@@ -130,18 +135,24 @@ class NatNetSession:
             messages.append(self._connect())
         if self.phase is Phase.CONNECTED:
             messages += [self._questions.due(now_s), self._echoes.due(now_s)]
-            if self._definitions.due(now_s):
+            if self._may_ask_definitions(now_s) and self._definitions.due(now_s):
                 messages.append(RequestModelDef())
         return [encode(message) for message in messages if message is not None]
 
-    def next_due_s(self) -> float:
+    def next_due_s(self, now_s: float) -> float:
         """When to ask `due` again, if nothing arrives."""
         times = [self._heard_s + self._silence_s]
         if self._connect_wanted:
             times.append(self._connecting.next_s)
         if self.phase is Phase.CONNECTED:
-            times += [self._questions.next_s, self._echoes.next_s, self._definitions.next_s]
+            times += [self._questions.next_s, self._echoes.next_s]
+            if self._may_ask_definitions(now_s):
+                times.append(self._definitions.next_s)
         return min(times)
+
+    def _may_ask_definitions(self, now_s: float) -> bool:
+        """They are asked for last: a server that waits for its client may begin to play then."""
+        return self._questions.settled and self._echoes.settled(now_s)
 
     def sent(self, datagram: bytes, sent_s: float) -> None:
         """A datagram left for the server; answers will refer to it."""
@@ -213,9 +224,17 @@ class NatNetSession:
             self._reconnect()
         if risen & FrameFlag.MODELS_CHANGED:
             self._definitions.want()
+        if not self._may_hand_on(received_s):
+            return None
         if not self._framing.names.agrees_with(data):
             self._definitions.doubt(received_s)
         return self._framing.frame(data, received_s)
+
+    def _may_hand_on(self, now_s: float) -> bool:
+        """Whether frames have their names; those that come while a server is still asked for them are of no use."""
+        if not self._prepared:
+            self._prepared = self._definitions.known or now_s - self._met_s > PREPARE_S
+        return self._prepared
 
     def _on_message(self, message: Message, datagram: bytes, received_s: float) -> None:
         match message:
@@ -244,8 +263,10 @@ class NatNetSession:
             return  # the answer to a CONNECT that was repeated
         if info != self.server:
             self._meet(info, now_s)
+            self._questions.begin(self._questions_for(info))
+        elif self._definitions.known:  # else it is still asked for the first time
+            self._questions.begin(self._questions_for(info))
         self._definitions.want()
-        self._questions.begin(self._questions_for(info))
         self._connect_wanted = False
         self._connecting.reset()
         self._heard_s = now_s
@@ -261,6 +282,7 @@ class NatNetSession:
             )
         self.bitstream = version if version <= LATEST else self._wanted or LATEST
         self.server = info
+        self._met_s, self._prepared = now_s, False
         self._definitions.forget()
         self._echoes.begin(info.connection.clock_hz if info.connection is not None else 0, now_s)
         self._framing.restart(self._echoes.clock)
@@ -281,6 +303,7 @@ class NatNetSession:
     def _on_definitions(self, definitions: ModelDef, datagram: bytes, now_s: float) -> None:
         for note in definitions.notes:
             _log.warning("%s: %s", self._peer, note)
+        self._heard_s = now_s
         if self._definitions.came(datagram, now_s):
             self._framing.describe(definitions)
 

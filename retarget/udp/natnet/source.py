@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from retarget.errors import ConnectionFailedError
 from retarget.udp.natnet.discovery import find_server
 from retarget.udp.natnet.link import Link
-from retarget.udp.natnet.session import NatNetSession, Phase
+from retarget.udp.natnet.session import PREPARE_S, NatNetSession, Phase
 from retarget.udp.natnet.url import DATA_PORT, MULTICAST_GROUP, NatNetUrl, parse_natnet_url
 from retarget.udp.sockets import local_address_towards, resolve
 from retarget.udp.stats import StreamStats
@@ -35,8 +35,7 @@ QUEUE_FRAMES = 4096
 """Frames that wait for a lagging reader before the oldest go: 17 s at 240 Hz."""
 
 _log = logging.getLogger("retarget.natnet")
-_PREPARE_S = 3.0
-_LONGEST_WAIT_S = 0.5
+_SHORT_WAIT_S, _LONGEST_WAIT_S = 0.05, 0.5
 
 
 class NatNetSource:
@@ -60,7 +59,6 @@ class NatNetSource:
         self._queue_frames = queue_frames
         self._session = NatNetSession()
         self._link: Link | None = None
-        self._early: list[MarkerFrame] = []
 
     def __enter__(self) -> NatNetSource:
         server, local = self._addresses()
@@ -81,8 +79,6 @@ class NatNetSource:
         return self
 
     def __next__(self) -> MarkerFrame:
-        if self._early:
-            return self._early.pop(0)
         link = self._opened()
         while self._session.phase is not Phase.ENDED and not link.closed:
             frame = self._step(link, _LONGEST_WAIT_S)
@@ -90,8 +86,13 @@ class NatNetSource:
                 return frame
         raise StopIteration
 
+    def stop(self) -> None:
+        """End the iteration soon; may be called from another thread or from a signal's function."""
+        if self._link is not None:
+            self._link.stop()
+
     def close(self) -> None:
-        """Stop; also from another thread, whose waiting iteration ends. Counts stay."""
+        """Leave the server. Counts stay."""
         if self._link is not None:
             self._link.close()
 
@@ -151,25 +152,20 @@ class NatNetSource:
         while self._session.phase is Phase.CONNECTING:
             if time.monotonic() > deadline_s:
                 raise ConnectionFailedError(_advice(link.server))
-            self._step_early(link)
-        deadline_s = time.monotonic() + _PREPARE_S
+            self._step(link, _SHORT_WAIT_S)
+        deadline_s = time.monotonic() + PREPARE_S
         while not self._session.ready(time.monotonic()) and self._session.phase is not Phase.ENDED:
             if time.monotonic() > deadline_s:
                 _log.warning("%s:%d tells no marker names; they are numbered until it does.", *link.server)
                 return
-            self._step_early(link)
-
-    def _step_early(self, link: Link) -> None:
-        frame = self._step(link, 0.05)
-        if frame is not None:
-            self._early.append(frame)
+            self._step(link, _SHORT_WAIT_S)
 
     def _step(self, link: Link, longest_wait_s: float) -> MarkerFrame | None:
         """Send what is due, and take at most one datagram."""
         now_s = time.monotonic()
         for payload in self._session.due(now_s):
             self._session.sent(payload, link.send(payload))
-        arrival = link.receive(min(longest_wait_s, max(0.0, self._session.next_due_s() - now_s)))
+        arrival = link.receive(min(longest_wait_s, max(0.0, self._session.next_due_s(now_s) - now_s)))
         if arrival is None:
             return None
         frame = self._session.receive(arrival.payload, arrival.received_s)
