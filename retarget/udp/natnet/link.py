@@ -83,9 +83,11 @@ class Link:
 
     def send(self, payload: bytes) -> float:
         """Send a message to the command port; return the local time at which it left [s]."""
-        sent_s = time.monotonic()
-        self._sockets["command"].send(payload, self._server)
-        self._tell(Datagram(sent_s, "out", "command", self._server, payload))
+        with self._tapping:  # or the answer could be told before the question, and a replay would not know it
+            sent_s = time.monotonic()
+            self._sockets["command"].send(payload, self._server)
+            if self._tap is not None:
+                self._tap(Datagram(sent_s, "out", "command", self._server, payload))
         return sent_s
 
     def receive(self, timeout_s: float) -> Arrival | None:
