@@ -118,7 +118,7 @@ class TakeSource:
     @property
     def rate_hz(self) -> float | None:
         """As the server told [Hz]."""
-        return self._frames.session.rate_hz
+        return self._frames.rate_hz
 
     def counts(self) -> dict[str, int]:
         """What became of the datagrams on their way to the recorder."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -110,7 +111,7 @@ def _print_take(inspection: Inspection) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
+    console = Console(width=None if sys.stdout.isatty() else 120)
     rate = f" at {inspection.rate_hz:g} Hz" if inspection.rate_hz else ""
     click.echo(f"{inspection.path}: {inspection.frames.received:,} frames{rate}, {inspection.duration_s:.2f} s")
     for name, fact in inspection.facts.items():
