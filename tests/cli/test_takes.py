@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -55,8 +56,9 @@ def test_a_take_on_its_way_through_a_capture_gives_the_same_poses(recorded: tupl
     converted = retarget("convert", str(take), str(tmp_path / "take.pcapng"))
     assert converted.returncode == 0, converted.stderr
     retarget("run", str(tmp_path / "take.pcapng"), "--to", str(tmp_path / "again.csv"))
-    joints = [[row.split(",")[9:] for row in p.read_text().splitlines()] for p in (live, tmp_path / "again.csv")]
-    assert joints[0] == joints[1]
+    before, after = (np.loadtxt(p, delimiter=",", skiprows=1) for p in (live, tmp_path / "again.csv"))
+    # a capture's clock counts nanoseconds, a take's more finely, so gaps are eased over a little by the rounding
+    np.testing.assert_allclose(after[:, 2:], before[:, 2:], atol=1e-7)
 
 
 @pytest.mark.parametrize("ending", [".c3d", ".trc", ".csv"])
