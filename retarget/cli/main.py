@@ -19,6 +19,7 @@ COMMANDS = {
     "replay": "Serve a take as a live NatNet server.",
     "convert": "Change a take's or a marker file's format.",
     "inspect": "Show what is in a take, a rig or a performer file.",
+    "doctor": "Find out why a live stream does not come, step by step.",
     "rigs": "List the rigs that can be driven.",
 }
 
