@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+import ezc3d
 import numpy as np
 import pytest
 
 from retarget.errors import ConnectionFailedError, InputError
+from retarget.frames import MarkerFrame, MarkerLayout
 from retarget.udp.natnet import clients, player
 from retarget.udp.natnet.client import NatNetClient
 from retarget.udp.natnet.codec import encode
@@ -22,8 +24,7 @@ from retarget.udp.natnet.version import Bitstream
 from retarget.udp.sockets import open_udp, wait_readable
 from tests.udp.natnet.live import assert_same_markers, serve, take, until, url
 
-if TYPE_CHECKING:
-    from retarget.frames import MarkerFrame
+JAW = Path(__file__).parents[3] / "../shared/data/animface/jaw.c3d"
 
 
 def test_several_clients_get_every_frame_each_in_its_own_bitstream() -> None:
@@ -127,6 +128,18 @@ def test_playback_is_controlled_over_the_network() -> None:
         assert numbers[:5] == [55, 56, 57, 58, 59]
         assert numbers[5:15] == list(range(50, 60))
         assert source.stats.lost <= 200
+
+
+@pytest.mark.skipif(not JAW.exists(), reason=f"the real take is not at {JAW}")
+def test_the_real_jaw_take_loses_no_frame_at_twenty_times_its_speed() -> None:
+    recorded = ezc3d.c3d(str(JAW))
+    positions = 1e-3 * np.moveaxis(recorded["data"]["points"][:3], 0, -1).swapaxes(0, 1)
+    layout = MarkerLayout("jaw", tuple(recorded["parameters"]["POINT"]["LABELS"]["value"]))
+    frames = [MarkerFrame(i, i / 60, i / 60, layout, positions[i]) for i in range(len(positions))]
+    with serve(frames, speed=20.0) as server, NatNetSource(url(server)) as source:
+        assert_same_markers(list(source), frames)
+        assert len(frames) == 1590
+        assert source.stats.lost == source.stats.dropped == 0
 
 
 def _stands_still(source: NatNetSource) -> bool:
