@@ -53,6 +53,13 @@ def gather(bone_weights: dict[str, NDArray[np.float64]]) -> Bones:
     return Bones(1 - jaw - neck, jaw, neck)
 
 
+def stand(bones: Bones, foot: NDArray[np.float64]) -> Bones:
+    """The weights with the neck's share raised to at least `foot` (V,), so that the rim stays a clean loop."""
+    neck = np.maximum(bones.neck, foot)
+    rest = (1 - neck) / np.maximum(1 - bones.neck, 1e-9)
+    return Bones(bones.head * rest, bones.jaw * rest, neck)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Regions:
     """Parts of the skin that the binding treats apart; (V,) masks."""

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rigs.recipe.atlas import inner, islands, pack
-from rigs.recipe.binding import Binding, Regions, bind_skin, gather
+from rigs.recipe.binding import Binding, Regions, bind_skin, gather, stand
 from rigs.recipe.complexion import hair_cover
-from rigs.recipe.paint import look_up
+from rigs.recipe.paint import look_up, smoothstep
 from rigs.recipe.part import Part, vertex_normals
 from rigs.recipe.refine import refine, thicken
 from rigs.recipe.shapes import iron, looseness
 from rigs.recipe.sites import LEFT, MIDDLE, other_side
 from rigs.recipe.skin import close, cut_head
+from rigs.recipe.weights import surface_distance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,6 +30,8 @@ CUT_ABOVE_NECK_M = 0.010
 CUT_TILT_DEG = 18.0
 SPLITS, LONGEST_EDGE_M = 2, 0.014
 HAIR_M = 0.0035
+FOOT_M = (0.004, 0.035)
+"""The skin belongs to the neck alone up to the first distance from the cut, and as MakeHuman says from the second."""
 LIPS_UP_M = {"lipLower": 0.0009, "lipUpper": -0.0002}
 """How far the lips move to shut the mouth."""
 LIPS_LOOSE = 0.35
@@ -68,9 +71,20 @@ def bind(skin: Skin, person: Person, wheel: Wheel) -> Face:
     """Find the sites, weigh the skin, and shut the mouth."""
     count = len(person.vertices)
     sites = _site_vertices(skin, wheel.mirror(count))
+    positions = skin.positions(person.vertices)
+    to_rim = surface_distance(positions, skin.triangles, skin.rim)
+    to_rim[_below(positions, skin)] = 0
     bones = gather({bone: skin.lift @ row for bone, row in wheel.bone_weights(count).items()})
-    binding = bind_skin(skin.positions(person.vertices), skin.triangles, sites, bones, _regions(skin, person))
+    bones = stand(bones, smoothstep(FOOT_M[1], FOOT_M[0], to_rim))
+    binding = bind_skin(positions, skin.triangles, sites, bones, _regions(skin, person))
     return Face(_shut(skin, binding), sites, binding)
+
+
+def _below(positions: NDArray[np.float64], skin: Skin) -> NDArray[np.bool_]:
+    """(V,) the vertices of the base, which lie below the plane of the rim."""
+    rim = positions[skin.rim]
+    normal = np.linalg.svd(rim - rim.mean(0))[2][2]
+    return np.asarray((positions - rim.mean(0)) @ (normal * np.sign(normal[1])) < 0)
 
 
 def _site_vertices(skin: Skin, mirror: NDArray[np.intp]) -> dict[str, int]:

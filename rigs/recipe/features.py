@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rigs.recipe.person import Person
     from rigs.recipe.skeleton import Skeleton
 
-LASHES = (("1", 26, 0.4), ("2", 38, 0.6))
+LASHES = (("1", 20, 0.26), ("2", 40, 0.6))
 """MakeHuman's strip (lower, upper lid), the number of hairs, their length in widths of the strip."""
 LASH_SEED = 7
 EDGE_BELOW_HELPER_M, FRONT_BEHIND_HELPER_M = 0.0024, 0.0004
@@ -85,7 +85,7 @@ def lashes_part(
             lift, triangles = hairs(strip_grid(quads, near), count, length, len(person.vertices), rng)
             at = lift @ person.vertices
             beside = tree.query(at)[1]
-            uv = np.full((len(at), 2), 0.5)
+            uv = np.tile([0.5, 0.75 if strip == "1" else 0.25], (len(at), 1))
             shapes = {name: lift @ offsets for name, offsets in person.units.items()}
             normals = vertex_normals(at, triangles)
             parts.append(Part("lashes", at, normals, uv, triangles, joints[beside], weights[beside], shapes))

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from rigs.recipe.source import Wheel
 
 SKIN_SIZE, SKIN_QUALITY = 1024, 90
-LASH = (34, 25, 21)
+LASHES = np.array([[[34, 25, 21]] * 4] * 2 + [[[112, 78, 64]] * 4] * 2, dtype=np.uint8)
+"""The picture of the lashes: the upper ones over the lower ones."""
 ASSET = {"generator": "retarget rigs/build_human.py", "copyright": "CC0 1.0 Universal"}
 
 
@@ -49,7 +50,7 @@ def build(wheel: Wheel) -> bytes:
         Look(_skin_picture(face, positions - human.eye_middle(), lip_mask), 0.62),
         Look(jpeg(pictures.eye(), 92), 0.12),
         Look(jpeg(pictures.mouth(), 90), 0.35),
-        Look(png(np.full((4, 4, 3), LASH, dtype=np.uint8)), 0.9, double_sided=True),
+        Look(png(LASHES), 0.9, double_sided=True),
     ]
     return write_glb("human", parts, looks, joints, ARKIT, ASSET)
 

@@ -321,18 +321,37 @@ def test_the_skin_is_closed_and_every_edge_has_two_triangles(skin: Surface) -> N
     assert (uses == 2).all()
 
 
-def test_the_neck_ends_in_one_clean_loop(skin: Surface) -> None:
-    """The foot is flat: around its middle vertex the rings of the base lie in planes parallel to the cut."""
-    positions, index = np.unique(skin.positions, axis=0, return_inverse=True)
-    triangles = index.ravel()[skin.triangles]
-    lowest = positions[np.argmin(positions[:, 1])]
-    hub = np.flatnonzero(np.bincount(triangles.ravel()) > 30)
-    ring = np.unique(triangles[np.isin(triangles, hub).any(1)])
-    centred = positions[ring] - positions[ring].mean(0)
-    spread = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(ring))
+def rim_ring(surface: Surface) -> NDArray[Any]:
+    """(R, 3) the vertices around the one in the middle of the base, which more triangles share than any other."""
+    positions, index = np.unique(surface.positions, axis=0, return_inverse=True)
+    triangles = index.ravel()[surface.triangles]
+    hub = np.argmax(np.bincount(triangles.ravel()))
+    ring = np.unique(triangles[(triangles == hub).any(1)])
+    return np.asarray(positions[ring[ring != hub]])
+
+
+def rim_normal(surface: Surface) -> NDArray[Any]:
+    ring = rim_ring(surface)
+    return np.asarray(np.linalg.svd(ring - ring.mean(0))[2][2])
+
+
+def test_the_neck_ends_in_one_clean_loop(model: Model, skin: Surface) -> None:
+    """The ring that closes the base is flat, convex seen from below, and lies under the head."""
+    ring = rim_ring(skin) - rim_ring(skin).mean(0)
     assert len(ring) > 40
-    assert spread[2] < 2e-4
-    assert positions[ring, 1].min() - lowest[1] < 0.01
+    assert np.abs(ring @ rim_normal(skin)).max() < 2e-4
+    turn = np.sort(np.arctan2(ring[:, 2], ring[:, 0]))
+    assert np.diff(turn).max() < 0.4
+    assert skin.positions[:, 1].min() == pytest.approx(0, abs=1e-6)
+    assert model.places["neck"][1] > 0.02
+
+
+def test_the_foot_of_the_neck_follows_the_neck_alone(model: Model, skin: Surface) -> None:
+    """Else a turn of the head would bend the rim: the base and the skin just above it, from the closing ring."""
+    from_base = (skin.positions - rim_ring(skin).mean(0)) @ rim_normal(skin)
+    base = np.abs(from_base) < 0.007
+    assert base.sum() > 200
+    assert skin.weights_of(numbers(model, {"neck"}))[base].min() > 0.99
 
 
 def test_normals_are_unit_and_point_outwards(model: Model) -> None:
