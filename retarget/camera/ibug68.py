@@ -1,7 +1,7 @@
 """The 68 landmarks of the iBUG 300-W scheme: their groups, and where each lies on the 468-point face mesh.
 
 Numbered from 0. The contour runs from the performer's right ear (0) over the chin (8) to his left ear (16); brows are
-17 to 26, the nose 27 to 35, the right eye 36 to 41, the left 42 to 47, the outer lips 48 to 59, the inner lips 60 to 67.
+17 to 26, nose 27 to 35, right eye 36 to 41, left eye 42 to 47, outer lips 48 to 59, inner lips 60 to 67.
 Sagonas et al. 2013, "300 Faces in-the-Wild Challenge", figure 1; left and right are the performer's.
 """
 
@@ -22,11 +22,11 @@ EYE_LEFT = (42, 43, 44, 45, 46, 47)
 """Corner on the performer's right, then clockwise in the picture: upper lid, other corner, lower lid."""
 MOUTH_RIGHT, MOUTH_LEFT = 48, 54
 
-_CONTOUR = (127, 234, 93, 132, 58, 136, 150, 176, 152, 400, 379, 365, 288, 361, 323, 454, 356)
+_CONTOUR = (234, 93, 132, 58, 172, 150, 149, 148, 152, 377, 378, 379, 397, 288, 361, 323, 454)
 _BROW_RIGHT, _BROW_LEFT = (70, 63, 105, 66, 107), (336, 296, 334, 293, 300)
-_NOSE = (168, 197, 5, 1, 98, 97, 2, 326, 327)
+_NOSE = (168, 6, 195, 4, 98, 97, 2, 326, 327)
 _EYES = (33, 160, 158, 133, 153, 144, 362, 385, 387, 263, 373, 380)
-_LIPS = (61, 39, 37, 0, 267, 269, 291, 405, 314, 17, 84, 181, 78, 82, 13, 312, 308, 317, 14, 87)
+_LIPS = (61, 40, 37, 0, 267, 270, 291, 405, 314, 17, 84, 181, 78, 82, 13, 312, 308, 317, 14, 87)
 
 MESH_POINTS: NDArray[np.intp] = np.array((*_CONTOUR, *_BROW_RIGHT, *_BROW_LEFT, *_NOSE, *_EYES, *_LIPS), np.intp)
 """(68,) the vertex of the face mesh nearest to each landmark; the contour of the mesh follows the skull, that of the
