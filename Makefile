@@ -1,7 +1,7 @@
 # One command each on a fresh machine: `make demo` and `make test` set everything up themselves.
 PYTHON ?= python3
 BIN := .venv/bin
-.PHONY: setup demo test lint bench lock clean
+.PHONY: setup demo test lint bench mutate soak lock clean
 
 setup: .venv/.stamp
 
@@ -26,6 +26,13 @@ test: lint
 
 bench: setup
 	$(BIN)/python -m tests.benchmarks
+
+# Slow suites.
+mutate: setup
+	$(BIN)/python -m tests.udp.natnet.mutate --count 1000000
+
+soak: setup
+	$(BIN)/python -m tests.soak --minutes 10
 
 lock:
 	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-annotate --no-header -o requirements.lock

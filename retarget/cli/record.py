@@ -36,7 +36,7 @@ def command(source: str, take: str, seconds: float | None) -> None:
         raise click.BadParameter(
             f"{take} must end in .mcap; convert it afterwards to other formats.", param_hint="TAKE"
         )
-    open_source(source)  # a wrong address is told before a file is made
+    open_source(source, tap=lambda _: None)  # what cannot be recorded is told before a file is made
     with TakeRecorder(Path(take), TakeMetadata(source=source, versions=versions())) as recorder:
         stream = open_source(source, tap=recorder)
         with stopped_by_signals(stream.stop), stopped_after(seconds, stream.stop), stream:

@@ -67,7 +67,7 @@ def perform(where: str, targets: tuple[str, ...], seconds: float | None, options
 
     files = tuple(target for target in targets if target != WINDOW)
     session = _session(options)
-    open_source(where)  # a wrong address is told before a take is made
+    open_source(where, (lambda _: None) if options["record"] else None)  # what cannot be is told before a take is made
     with ExitStack() as stack:
         opened = open_source(where, stack.enter_context(_recorder(where, options)) if options["record"] else None)
         source = Paced(opened) if WINDOW in targets and not opened.live else opened
