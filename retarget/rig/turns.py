@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-Quat = tuple[float, float, float, float]
+Quat = geometry.Quat
 
 
 def multiply(a: Quat, b: Quat) -> Quat:
@@ -42,18 +42,8 @@ def about(axis: tuple[float, float, float], angle: float) -> Quat:
 
 
 def from_matrix(R: Array) -> Quat:
-    """The turn of a rotation matrix (3, 3), w >= 0; from the largest of the four candidates (Shepperd 1978)."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
-    squares = (1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz)
-    candidates = (
-        (squares[0], xy + yx, xz + zx, zy - yz),
-        (xy + yx, squares[1], yz + zy, xz - zx),
-        (xz + zx, yz + zy, squares[2], yx - xy),
-        (zy - yz, xz - zx, yx - xy, squares[3]),
-    )
-    x, y, z, w = candidates[squares.index(max(squares))]
-    length = math.copysign(math.sqrt(x * x + y * y + z * z + w * w), w)
-    return x / length, y / length, z / length, w / length
+    """The turn of a rotation matrix (3, 3), w >= 0."""
+    return geometry.quat_from_rows(R.tolist())
 
 
 def part(turn: Quat, fraction: float) -> Quat:
