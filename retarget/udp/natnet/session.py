@@ -15,8 +15,9 @@ import math
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from retarget.errors import ConnectionFailedError, ProtocolError
+from retarget.errors import ConnectionFailedError
 from retarget.udp.natnet.codec import decode, encode
+from retarget.udp.natnet.decoding import Decoding
 from retarget.udp.natnet.definitions import DefinitionsWatch
 from retarget.udp.natnet.echo import Echoes
 from retarget.udp.natnet.framedata import FrameOfData
@@ -56,7 +57,6 @@ PREPARE_S = 3.0
 """For so long, frames wait for their names; then they are handed on with numbers for names [s]."""
 
 _LONGEST_SILENCE_S = 10.0
-_FAILURES_IN_A_ROW = 5
 _OBSERVED = {MessageId.REQUEST, MessageId.ECHOREQUEST}  # of what is sent, what an answer refers to
 _log = logging.getLogger("retarget.natnet")
 
@@ -80,6 +80,7 @@ class NatNetSession:
     def __init__(self, peer: str = "the server", wanted: Bitstream | None = DEFAULT_BITSTREAM) -> None:
         self._peer = peer
         self._wanted = wanted
+        self._decoding = Decoding(peer, wanted)
         self._framing = Framing()
         self._questions = Questions()
         self._definitions = DefinitionsWatch()
@@ -91,18 +92,29 @@ class NatNetSession:
         self._silent = False
         self._met_s = math.inf
         self._prepared = False
-        self._failures_in_a_row = 0
         self._flags = 0
         self.phase = Phase.CONNECTING
         self.server: ServerInfo | None = None
-        self.bitstream: Bitstream | None = None
-        """The version that frames are read in."""
-        self.reconnects = self.malformed = 0
+        self.reconnects = 0
 
     @property
     def framing(self) -> Framing:
         """Counts of frames."""
         return self._framing
+
+    @property
+    def bitstream(self) -> Bitstream | None:
+        """The version that frames are read in; set it where a capture does not tell."""
+        return self._decoding.bitstream
+
+    @bitstream.setter
+    def bitstream(self, bitstream: Bitstream) -> None:
+        self._decoding.bitstream = bitstream
+
+    @property
+    def malformed(self) -> int:
+        """Datagrams that do not follow the protocol."""
+        return self._decoding.malformed
 
     @property
     def layout(self) -> MarkerLayout:
@@ -170,55 +182,19 @@ class NatNetSession:
         What does not follow the protocol is counted in `malformed`. Raises `ConnectionFailedError` when the server's
         version is too old to be read.
         """
-        try:
-            message = self._decode(datagram)
-        except ProtocolError as error:
-            self._count_malformed(datagram, error)
-            return None
+        message = self._decoding.read(datagram)
         if isinstance(message, FrameOfData):
             return self._on_frame(message, received_s)
-        self._on_message(message, datagram, received_s)
-        return None
-
-    def _decode(self, datagram: bytes) -> Message:
-        """Read a datagram; where a server does not say clearly which version it sends, those that it may are tried."""
-        try:
-            message = decode(datagram, self.bitstream)
-        except ProtocolError:
-            return self._decode_otherwise(datagram)
-        return message
-
-    def _decode_otherwise(self, datagram: bytes) -> Message:
-        announced = self.server.sender.bitstream if self.server is not None else None
-        for version in (self._wanted, announced):
-            if version is None or version == self.bitstream or self.bitstream is None:
-                continue
-            try:
-                message = decode(datagram, version)
-            except ProtocolError:
-                continue
-            _log.info("%s sends bitstream %s.", self._peer, version)
-            self.bitstream = version
-            return message
-        return decode(datagram, self.bitstream)
-
-    def _count_malformed(self, datagram: bytes, error: ProtocolError) -> None:
-        self.malformed += 1
-        _log.debug("A datagram of %d bytes from %s is skipped: %s", len(datagram), self._peer, error)
-        if int.from_bytes(datagram[:2], "little") != MessageId.FRAMEOFDATA or self.bitstream is None:
-            return
-        self._failures_in_a_row += 1
-        if self._failures_in_a_row == _FAILURES_IN_A_ROW:
-            _log.warning(
-                "%s sends frames that are not of bitstream %s; connecting again. %s", self._peer, self.bitstream, error
-            )
+        if message is not None:
+            self._on_message(message, datagram, received_s)
+        elif self._decoding.lost_track():
             self._reconnect()
+        return None
 
     def _on_frame(self, data: FrameOfData, received_s: float) -> MarkerFrame | None:
         if self._silent:
             _log.warning("Frames from %s again.", self._peer)
         self._silent, self._heard_s, self._silence_s = False, received_s, SILENCE_S
-        self._failures_in_a_row = 0
         risen, self._flags = data.params & ~self._flags, data.params
         if risen & FrameFlag.BITSTREAM_CHANGED:
             self._reconnect()
@@ -231,9 +207,13 @@ class NatNetSession:
         return self._framing.frame(data, received_s)
 
     def _may_hand_on(self, now_s: float) -> bool:
-        """Whether frames have their names; those that come while a server is still asked for them are of no use."""
+        """Whether frames have their names; those that come while a server is still asked for them are of no use.
+
+        Where no server was met, as in a capture that began too late for it, nothing is waited for.
+        """
         if not self._prepared:
-            self._prepared = self._definitions.known or now_s - self._met_s > PREPARE_S
+            waited = self.server is None or now_s - self._met_s > PREPARE_S
+            self._prepared = waited or self._definitions.known
         return self._prepared
 
     def _on_message(self, message: Message, datagram: bytes, received_s: float) -> None:
@@ -280,6 +260,7 @@ class NatNetSession:
                 f"{self._peer} ({info.sender.name}) sends bitstream {version}, which is too old to be read; "
                 f"update it to one that sends {OLDEST} or later."
             )
+        self._decoding.announced = version
         self.bitstream = version if version <= LATEST else self._wanted or LATEST
         self.server = info
         self._met_s, self._prepared = now_s, False

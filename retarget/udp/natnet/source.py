@@ -19,7 +19,7 @@ from retarget.errors import ConnectionFailedError
 from retarget.udp.natnet.discovery import find_server
 from retarget.udp.natnet.link import Link
 from retarget.udp.natnet.session import PREPARE_S, NatNetSession, Phase
-from retarget.udp.natnet.url import DATA_PORT, MULTICAST_GROUP, NatNetUrl, parse_natnet_url
+from retarget.udp.natnet.url import NatNetUrl, parse_natnet_url
 from retarget.udp.sockets import local_address_towards, resolve
 from retarget.udp.stats import StreamStats
 
@@ -59,6 +59,7 @@ class NatNetSource:
         self._queue_frames = queue_frames
         self._session = NatNetSession()
         self._link: Link | None = None
+        self._first: MarkerFrame | None = None
 
     def __enter__(self) -> NatNetSource:
         server, local = self._addresses()
@@ -79,6 +80,9 @@ class NatNetSource:
         return self
 
     def __next__(self) -> MarkerFrame:
+        if self._first is not None:
+            frame, self._first = self._first, None
+            return frame
         link = self._opened()
         while self._session.phase is not Phase.ENDED and not link.closed:
             frame = self._step(link, _LONGEST_WAIT_S)
@@ -158,7 +162,9 @@ class NatNetSource:
             if time.monotonic() > deadline_s:
                 _log.warning("%s:%d tells no marker names; they are numbered until it does.", *link.server)
                 return
-            self._step(link, _SHORT_WAIT_S)
+            self._first = self._step(link, _SHORT_WAIT_S)
+            if self._first is not None:
+                return
 
     def _step(self, link: Link, longest_wait_s: float) -> MarkerFrame | None:
         """Send what is due, and take at most one datagram."""
@@ -175,12 +181,11 @@ class NatNetSource:
 
     def _follow_group(self, link: Link) -> None:
         """Join the group that is wanted, or that the server announces."""
-        told = self._session.server.connection if self._session.server is not None else None
-        if self._session.server is None or not (self._url.multicast or (told is not None and told.is_multicast)):
+        if self._session.server is None:
             return
-        group = self._url.group or (told.group if told is not None else MULTICAST_GROUP)
-        port = self._url.data_port or (told.data_port if told is not None and told.data_port else DATA_PORT)
-        link.join((MULTICAST_GROUP if group == "0.0.0.0" else group, port))  # noqa: S104 - a 2.x server's empty field
+        group = self._url.group_for(self._session.server.connection)
+        if group is not None:
+            link.join(group)
 
 
 def _advice(server: Address) -> str:
