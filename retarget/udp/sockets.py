@@ -1,4 +1,4 @@
-"""UDP sockets, the only ones of this package: where they are bound, what they join, how large their buffers are.
+"""The only sockets of this package, UDP and TCP: where they are bound, what they join, how large their buffers are.
 
 Nothing binds to all interfaces unless the caller names the address 0.0.0.0 himself. Where the kernel stamps arrivals
 (Linux, SO_TIMESTAMPNS in socket(7)), its time is used, so that a busy receiver thread does not make frames look late.
@@ -42,6 +42,7 @@ _COUNT = struct.Struct("@I")
 _OLDEST_STAMP_S = 10.0
 _GONE = {errno.ECONNREFUSED, errno.ECONNRESET, errno.EHOSTUNREACH, errno.ENETUNREACH, errno.ENETDOWN}
 _FULL = {errno.EAGAIN, errno.ENOBUFS, errno.EPERM}
+_TCP_READ = 65_536
 
 
 class Refusal(Enum):
@@ -140,6 +141,159 @@ class UdpSocket:
         return age_s if 0.0 <= age_s < _OLDEST_STAMP_S else 0.0  # the wall clock may have been set meanwhile
 
 
+class Probe:
+    """One datagram to `peer`, and what the network says against it; use it as a context manager.
+
+    Systems other than Linux tell only of a port that nobody has.
+    """
+
+    def __init__(self, payload: bytes, peer: Address, local: str) -> None:
+        self._socket = _udp_socket()
+        _bind(self._socket, (local, 0))
+        self._refusal: Refusal | None = None
+        if _LINUX:
+            self._socket.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
+        try:
+            self._socket.connect(peer)  # the kernel hands ICMP on only to a socket that has one peer
+            self._socket.send(payload)
+        except OSError as error:
+            self._refusal = _REFUSALS.get(error.errno or 0)
+
+    def refusal(self, wait_s: float) -> Refusal | None:
+        """What was said up to now; waits for a word or an answer at most `wait_s` [s].
+
+        That a machine does not answer to its address the kernel says after about three seconds.
+        """
+        if self._refusal is None:
+            waiting = select.poll()
+            waiting.register(self._socket, select.POLLIN)
+            waiting.poll(math.ceil(1e3 * wait_s))
+            self._refusal = _REFUSALS.get(self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR))
+        return self._refusal
+
+    def __enter__(self) -> Probe:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._socket.close()
+
+
+class TcpStream:
+    """One TCP connection. Close it, or use it as a context manager."""
+
+    def __init__(self, connected: socket.socket, patience_s: float) -> None:
+        """`patience_s` [s] is how long `send` waits for a peer that does not read."""
+        self._socket = connected
+        connected.settimeout(patience_s)
+        connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # each message leaves at once, on its own
+
+    @property
+    def peer(self) -> Address:
+        """The other end."""
+        host, port = self._socket.getpeername()
+        return host, port
+
+    def fileno(self) -> int:
+        """Descriptor for `wait_readable`; -1 once closed."""
+        return self._socket.fileno()
+
+    def receive(self) -> bytes | None:
+        """What has come; None when there is nothing now, empty when the peer has gone."""
+        if not wait_readable([self._socket.fileno()], 0.0):
+            return None
+        try:
+            return self._socket.recv(_TCP_READ)
+        except TimeoutError:
+            return None
+        except OSError:
+            return b""
+
+    def send(self, payload: bytes) -> bool:
+        """Send all of it; False when the peer has gone or does not read."""
+        try:
+            self._socket.sendall(payload)
+        except OSError:  # a timeout too
+            return False
+        return True
+
+    def close(self) -> None:
+        """Hang up."""
+        self._socket.close()
+
+    def __enter__(self) -> TcpStream:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class TcpListener:
+    """A TCP port that others connect to. Close it, or use it as a context manager."""
+
+    def __init__(self, listening: socket.socket) -> None:
+        self._socket = listening
+        listening.setblocking(False)
+
+    @property
+    def address(self) -> Address:
+        """Where this socket is bound."""
+        host, port = self._socket.getsockname()
+        return host, port
+
+    def fileno(self) -> int:
+        """Descriptor for `wait_readable`; -1 once closed."""
+        return self._socket.fileno()
+
+    def accept(self, patience_s: float) -> TcpStream | None:
+        """The next peer that wants to connect, None when there is none now."""
+        try:
+            connected, _ = self._socket.accept()
+        except OSError:
+            return None
+        return TcpStream(connected, patience_s)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._socket.close()
+
+    def __enter__(self) -> TcpListener:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def connect_tcp(address: Address, patience_s: float) -> TcpStream:
+    """Connect within `patience_s` [s]; raises `ConnectionFailedError` when nobody listens there."""
+    host, port = address
+    opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    opened.settimeout(patience_s)
+    try:
+        opened.connect(address)
+        if opened.getsockname() == opened.getpeername():  # the kernel chose the very port that nobody listens on
+            raise ConnectionRefusedError(errno.ECONNREFUSED, "Connection refused")
+    except OSError as error:
+        opened.close()
+        raise ConnectionFailedError(
+            f"Nobody takes a TCP connection at {host}:{port} ({_reason(error)}); start the program that listens there."
+        ) from error
+    return TcpStream(opened, patience_s)
+
+
+def listen_tcp(local: str, port: int, backlog: int = 10) -> TcpListener:
+    """Listen at one local address; raises `ConnectionFailedError` as `open_udp` does."""
+    opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    if sys.platform != "win32":  # there it would let two programs listen at once
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    _bind(opened, (local, port))
+    try:
+        opened.listen(backlog)
+    except OSError as error:
+        opened.close()
+        raise ConnectionFailedError(f"Cannot listen at {local}:{port}: {_advice(error, local, port)}.") from error
+    return TcpListener(opened)
+
+
 def open_udp(local: str = LOOPBACK, port: int = 0) -> UdpSocket:
     """Bind to one local address, on a port of the kernel's choice by default.
 
@@ -224,26 +378,6 @@ def local_address_towards(host: str) -> str:
                 f"No network leads to {host}: {_reason(error)}. Check the cable and the address."
             ) from error
         return str(probe.getsockname()[0])
-
-
-def refusal(payload: bytes, peer: Address, local: str, wait_s: float) -> Refusal | None:
-    """Send `payload` to `peer` and return what the network says against it.
-
-    None when the peer answers, or nothing is heard within `wait_s` [s]. Systems other than Linux tell only of a port.
-    """
-    with _udp_socket() as probe:
-        _bind(probe, (local, 0))
-        if _LINUX:
-            probe.setsockopt(socket.IPPROTO_IP, _IP_RECVERR, 1)
-        try:
-            probe.connect(peer)  # the kernel hands ICMP on only to a socket that has one peer
-            probe.send(payload)
-        except OSError as error:
-            return _REFUSALS.get(error.errno or 0)
-        waiting = select.poll()
-        waiting.register(probe, select.POLLIN)
-        waiting.poll(math.ceil(1e3 * wait_s))
-        return _REFUSALS.get(probe.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR))
 
 
 def local_addresses() -> list[str]:

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING
 from retarget.errors import ConnectionFailedError, InputError
 from retarget.udp.natnet.diagnosis import Outcome, Step
 from retarget.udp.natnet.discovery import find_server
-from retarget.udp.natnet.elsewhere import refused, who_answers, who_multicasts
+from retarget.udp.natnet.elsewhere import probe, who_answers, who_multicasts
 from retarget.udp.natnet.line import Line
 from retarget.udp.natnet.silence import no_answer, no_frames, told
-from retarget.udp.natnet.url import DATA_PORT, MULTICAST_GROUP, parse_natnet_url
+from retarget.udp.natnet.url import parse_natnet_url
 from retarget.udp.natnet.verdicts import (
     judge_clock,
     judge_frames,
@@ -29,11 +29,11 @@ from retarget.udp.natnet.verdicts import (
     judge_names,
     judge_version,
 )
-from retarget.udp.natnet.version import LATEST
+from retarget.udp.natnet.version import LATEST, OLDEST
 from retarget.udp.sockets import local_address_towards, resolve
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Generator
 
     from retarget.udp.natnet.messages import ServerInfo
     from retarget.udp.sockets import Address
@@ -44,7 +44,6 @@ VITAL = {"address", "answer", "stream", "version", "frames"}
 _AGREEMENT_S = 1.0
 _ENOUGH_UNREADABLE = 5
 _REFUSAL_S = 0.3
-_SLOW_REFUSAL_S = 1.0  # that nobody has an address, the kernel knows only after three seconds of asking
 
 
 class Examination:
@@ -67,7 +66,7 @@ class Examination:
         """Names of all markers, once the steps are done."""
         return self._line.session.layout.names if self._line is not None else ()
 
-    def steps(self) -> Iterator[Step]:
+    def steps(self) -> Generator[Step, None, None]:
         """The steps in their order, each as soon as it is done."""
         failed = ""
         with self._opened:
@@ -124,15 +123,16 @@ class Examination:
         return Step("address", Outcome.PASSED, f"discovered {found}, reached from {self._local}")
 
     def _answer(self) -> Step:
-        refusal = refused(self._server, self._local, _REFUSAL_S)
-        if refusal is None:
-            line = self._line = self._opened.enter_context(Line(self._url, self._server, self._local))
-            line.run(lambda: line.observed.server is not None, self._patience_s)
-            if line.observed.server is not None:
-                sender = line.observed.server.sender
-                version = ".".join(map(str, sender.app_version))
-                return Step("answer", Outcome.PASSED, f"{sender.name or 'a server without a name'}, version {version}")
-            refusal = refused(self._server, self._local, _SLOW_REFUSAL_S)
+        with probe(self._server, self._local) as asked:
+            if asked.refusal(_REFUSAL_S) is None:
+                line = self._line = self._opened.enter_context(Line(self._url, self._server, self._local))
+                line.run(lambda: line.observed.server is not None, self._patience_s)
+                if line.observed.server is not None:
+                    sender = line.observed.server.sender
+                    version = ".".join(map(str, sender.app_version))
+                    who = sender.name or "a server without a name"
+                    return Step("answer", Outcome.PASSED, f"{who}, version {version}")
+            refusal = asked.refusal(0.0)
         others = [] if refusal is not None else who_answers(self._server, self._local)
         return no_answer(self._server, refusal, others, self._patience_s)
 
@@ -155,7 +155,8 @@ class Examination:
 
     def _version(self) -> Step:
         line, announced = self._connected, self._info.sender.bitstream
-        line.run(lambda: line.session.ready(time.monotonic()), _AGREEMENT_S)
+        if announced >= OLDEST:
+            line.run(lambda: line.session.ready(time.monotonic()), _AGREEMENT_S)
         if announced > LATEST:  # only its frames can show whether it is readable
             seen = line.observed
             line.run(lambda: seen.frames > 0 or seen.unreadable_frames >= _ENOUGH_UNREADABLE, self._watch_s)
@@ -172,8 +173,7 @@ class Examination:
         if line.observed.frames or line.observed.unreadable_frames:
             return judge_frames(line.observed, line.session.rate_hz, line.session.bitstream)
         group = line.link.group
-        port = self._info.connection.data_port if self._info.connection is not None else 0
-        heard = who_multicasts(group or (MULTICAST_GROUP, port or DATA_PORT))
+        heard = who_multicasts(group or self._url.usual_group(self._info.connection))
         return no_frames(self._server, self._local, group, heard, line.link.foreign)
 
 

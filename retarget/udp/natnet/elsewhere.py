@@ -10,12 +10,12 @@ from retarget.errors import ConnectionFailedError
 from retarget.udp.natnet.codec import encode
 from retarget.udp.natnet.messages import Discovery, MessageId, Sender
 from retarget.udp.natnet.url import DEFAULT_BITSTREAM
-from retarget.udp.sockets import local_addresses, open_multicast_receiver, open_udp, refusal, wait_readable
+from retarget.udp.sockets import Probe, local_addresses, open_multicast_receiver, open_udp, wait_readable
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from retarget.udp.sockets import Address, Received, Refusal, UdpSocket
+    from retarget.udp.sockets import Address, Received, UdpSocket
 
 _QUESTION = encode(Discovery(Sender.named("retarget", (0, 1, 0, 0), (*DEFAULT_BITSTREAM, 0, 0))))
 _FRAME = int(MessageId.FRAMEOFDATA).to_bytes(2, "little")
@@ -23,9 +23,9 @@ _LISTEN_S = 0.5
 _MOST_HEARD = 32
 
 
-def refused(server: Address, local: str, wait_s: float) -> Refusal | None:
-    """What the network says against reaching the server within `wait_s` [s]; a question that makes no client."""
-    return refusal(_QUESTION, server, local, wait_s)
+def probe(server: Address, local: str) -> Probe:
+    """Ask the server for what the network says against it; the question makes no client."""
+    return Probe(_QUESTION, server, local)
 
 
 def who_answers(server: Address, local: str) -> list[Address]:

@@ -40,8 +40,11 @@ class NatNetUrl:
 
     def group_for(self, announced: ConnectionInfo | None) -> tuple[str, int] | None:
         """Group and port to listen to, given what the server announces; None where frames come to each client."""
-        if not (self.multicast or (announced is not None and announced.is_multicast)):
-            return None
+        wanted = self.multicast or (announced is not None and announced.is_multicast)
+        return self.usual_group(announced) if wanted else None
+
+    def usual_group(self, announced: ConnectionInfo | None) -> tuple[str, int]:
+        """Group and port that the server would send to if it were set to multicast."""
         group = self.group or (announced.group if announced is not None else MULTICAST_GROUP)
         port = self.data_port or (announced.data_port if announced is not None and announced.data_port else DATA_PORT)
         return (MULTICAST_GROUP if group == "0.0.0.0" else group), port  # noqa: S104 - a 2.x server's empty field

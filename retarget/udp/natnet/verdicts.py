@@ -36,7 +36,7 @@ def judge_version(announced: Bitstream, read_as: Bitstream | None, observed: Obs
             f"update it to one that sends {OLDEST} or later",
         )
     if announced <= LATEST:
-        other = "" if read_as == announced else f"; frames are read as {read_as}, as the server agreed"
+        other = "" if read_as == announced else f"; frames are read as {read_as}"
         return Step("version", Outcome.PASSED, f"bitstream {announced}{other}")
     found = f"bitstream {announced} is not known; {OLDEST} to {LATEST} are, and frames are read as {read_as}"
     advice = f"choose an older bitstream in the server's streaming settings, {LATEST} at the most"
