@@ -7,23 +7,23 @@ topology.
 from __future__ import annotations
 
 LEFT = {
-    "foreheadLeft": 7436,
+    "foreheadLeft": 7437,
     "browInnerLeft": 6983,
-    "browMidLeft": 6997,
-    "browOuterLeft": 6981,
+    "browMidLeft": 6996,
+    "browOuterLeft": 6999,
     "noseWingLeft": 11672,
     "lidUpperLeft": 6874,
     "lidLowerLeft": 11479,
-    "eyeInnerLeft": 11510,
+    "eyeInnerLeft": 6896,
     "eyeOuterLeft": 6812,
     "cheekUpperLeft": 11910,
-    "cheekLowerLeft": 11892,
-    "cheekOuterLeft": 11787,
+    "cheekLowerLeft": 11893,
+    "cheekOuterLeft": 11794,
     "lipUpperLeft": 11948,
     "lipCornerLeft": 10405,
     "lipLowerLeft": 7239,
     "chinLeft": 7454,
-    "mandibleLeft": 11818,
+    "mandibleLeft": 11905,
 }
 MIDDLE = {
     "forehead": 5192,
