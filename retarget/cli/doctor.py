@@ -90,19 +90,18 @@ def judge_layout(names: Sequence[str], layouts: Sequence[Layout], rig: Rig) -> S
     from retarget.udp.natnet.verdicts import shortened
 
     counts = [layout.sites_in(names) for layout in layouts]
-    known = " or ".join(layout.name for layout in layouts)
+    known = ", ".join(layout.name for layout in layouts)
     if max(counts) == 0:
         return Step(
             "layout",
             Outcome.FAILED,
-            f"none of the {len(names)} names is one of {known}: {shortened(names)}",
-            "the markers have other names than the layout expects",
+            f"none of the {len(names)} marker names is known: {shortened(names)}",
+            f"the markers have other names than the layout expects (looked at: {known})",
             "rename them on the server, or write a layout that lists their names as aliases, and give it as --layout",
         )
     if counts.count(max(counts)) > 1:
-        return Step(
-            "layout", Outcome.FAILED, f"{known} fit the names equally well", "", "choose one of them with --layout"
-        )
+        tied = " and ".join(layout.name for layout, count in zip(layouts, counts, strict=True) if count == max(counts))
+        return Step("layout", Outcome.FAILED, f"{tied} fit the names equally well", advice="choose one with --layout")
     layout = layouts[counts.index(max(counts))]
     return _judge_fit(names, layout, rig)
 
