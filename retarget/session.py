@@ -9,11 +9,12 @@ from __future__ import annotations
 import logging
 from collections import deque
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from retarget.errors import InputError
+from retarget.errors import InputError, RetargetError
 from retarget.markers.fill import Filler
 from retarget.markers.label import Labeller
 from retarget.markers.layouts import detect_layout, load_layout
@@ -23,7 +24,7 @@ from retarget.rig.fit import performer_from_neutral
 from retarget.rig.joints import JointMapping
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
@@ -50,13 +51,16 @@ class Session:
         performer: Performer | None = None,
         layout: Layout | None = None,
         jaw_mode: JawMode | None = None,
+        updates: Callable[[], Performer | None] = lambda: None,
     ) -> None:
         """`layout` is found from the first frame's names where neither it nor a performer tells it.
 
-        `jaw_mode` overrides how the performer's jaw is read.
+        `jaw_mode` overrides how the performer's jaw is read. `updates` is asked before every frame for a performer that
+        was edited meanwhile.
         """
         self._rig = rig
         self._jaw_mode = jaw_mode
+        self._updates = updates
         self._layout = layout or (load_layout(performer.layout) if performer else None)
         self._labeller: Labeller | None = None
         self._still: StillMoment | None = None
@@ -69,6 +73,9 @@ class Session:
         """The poses that `frame` makes possible: usually its own; none before the neutral is found, then all that
         waited.
         """
+        edited = self._updates()
+        if edited is not None:
+            self._adopt(edited)
         labelled = self._label(frame)
         if self._solver is None:
             self._waiting.append(labelled)
@@ -110,6 +117,18 @@ class Session:
         self.performer = self._as_asked(performer)
         return _Solver(self._rig, layout, self.performer, stabilised.T_world_head)
 
+    def _adopt(self, performer: Performer) -> None:
+        """Go on with another calibration from the next frame; if it does not fit, say so and keep the old one."""
+        performer = self._as_asked(performer)
+        try:
+            if self._solver is not None:
+                self._solver = self._solver.with_performer(performer)
+        except RetargetError as error:
+            log.warning("The performer stays as it was: %s", error)
+            return
+        self.performer = performer
+        log.warning("The performer %s was read again.", performer.name)
+
     def _as_asked(self, performer: Performer) -> Performer:
         if self._jaw_mode is None or performer.jaw is None:
             return performer
@@ -125,13 +144,23 @@ class _Solver:
     """The stages that need to know the neutral."""
 
     def __init__(self, rig: Rig, layout: MarkerLayout, performer: Performer, T_world_reference: Array) -> None:
-        neutral = neutral_in(layout, performer)
-        self._stabilise = Stabiliser(neutral[list(layout.head)], layout.head)
-        self._fill = Filler(neutral)
-        self._solve = JointMapping(rig, layout, performer, T_world_reference)
+        self._neutral = neutral_in(layout, performer)
+        self._for_performer = partial(JointMapping, rig, layout, T_world_reference=T_world_reference)
+        self._afresh = partial(_Solver, rig, layout, T_world_reference=T_world_reference)
+        self._stabilise = Stabiliser(self._neutral[list(layout.head)], layout.head)
+        self._fill = Filler(self._neutral)
+        self._solve = self._for_performer(performer)
+        self._layout = layout
 
     def __call__(self, frame: MarkerFrame) -> Pose:
         return self._solve(self._fill(self._stabilise(frame)))
+
+    def with_performer(self, performer: Performer) -> _Solver:
+        """The same with another calibration; what it remembers of the frames stays if the neutral does."""
+        if not np.array_equal(neutral_in(self._layout, performer), self._neutral, equal_nan=True):
+            return self._afresh(performer)
+        self._solve = self._for_performer(performer)
+        return self
 
 
 def neutral_in(layout: MarkerLayout, performer: Performer) -> Array:

@@ -6,6 +6,7 @@ import json
 import sys
 import threading
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -94,8 +95,6 @@ def summary(report: RunReport) -> str:
 
 
 def _recorder(where: str, options: dict[str, Any]) -> TakeRecorder:
-    from pathlib import Path
-
     from retarget.cli.record import versions
     from retarget.take.metadata import TakeMetadata
     from retarget.take.recorder import TakeRecorder
@@ -108,12 +107,14 @@ def _recorder(where: str, options: dict[str, Any]) -> TakeRecorder:
 def _session(options: dict[str, Any]) -> Any:
     from retarget.markers.layouts import load_layout
     from retarget.performer import load_performer
+    from retarget.performer_watch import PerformerWatch
     from retarget.rig.load import load_rig
     from retarget.session import Session
 
     layout = load_layout(options["layout"]) if options["layout"] else None
     performer = load_performer(options["performer"]) if options["performer"] else None
-    return Session(load_rig(options["rig"]), performer, layout, options["jaw"])
+    updates = PerformerWatch(Path(options["performer"])) if performer else lambda: None
+    return Session(load_rig(options["rig"]), performer, layout, options["jaw"], updates)
 
 
 def _settings(source: Source, options: dict[str, Any]) -> SinkSettings:
