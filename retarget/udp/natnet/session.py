@@ -15,7 +15,7 @@ import math
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from retarget.errors import ConnectionFailedError
+from retarget.errors import ConnectionFailedError, ProtocolError
 from retarget.udp.natnet.codec import decode, encode
 from retarget.udp.natnet.decoding import Decoding
 from retarget.udp.natnet.definitions import DefinitionsWatch
@@ -170,7 +170,10 @@ class NatNetSession:
         """A datagram left for the server; answers will refer to it."""
         if int.from_bytes(datagram[:2], "little") not in _OBSERVED:
             return
-        message = decode(datagram)
+        try:
+            message = decode(datagram)
+        except ProtocolError:  # what another client sent, in a capture
+            return
         if isinstance(message, Request):
             self._questions.put(message.command, sent_s)
         elif isinstance(message, EchoRequest):
@@ -241,6 +244,9 @@ class NatNetSession:
     def _on_server_info(self, info: ServerInfo, now_s: float) -> None:
         if not self._connect_wanted and info == self.server:
             return  # the answer to a CONNECT that was repeated
+        if info.sender.bitstream < OLDEST:
+            self._refuse(info)
+            return
         if info != self.server:
             self._meet(info, now_s)
             self._questions.begin(self._questions_for(info))
@@ -252,14 +258,19 @@ class NatNetSession:
         self._heard_s = now_s
         self.phase = Phase.CONNECTED
 
+    def _refuse(self, info: ServerInfo) -> None:
+        """Fail as long as nothing was received; a stream that runs does not end over one strange answer."""
+        message = (
+            f"{self._peer} ({info.sender.name}) sends bitstream {info.sender.bitstream}, which is too old to be read; "
+            f"update it to one that sends {OLDEST} or later."
+        )
+        if self.server is None:
+            raise ConnectionFailedError(message)
+        _log.warning("%s", message)
+
     def _meet(self, info: ServerInfo, now_s: float) -> None:
         """A server that was not known before, or one that changed."""
         version = info.sender.bitstream
-        if version < OLDEST:
-            raise ConnectionFailedError(
-                f"{self._peer} ({info.sender.name}) sends bitstream {version}, which is too old to be read; "
-                f"update it to one that sends {OLDEST} or later."
-            )
         self._decoding.announced = version
         self.bitstream = version if version <= LATEST else self._wanted or LATEST
         self.server = info

@@ -17,7 +17,9 @@ from retarget.udp.natnet.session import NatNetSession, Phase
 from retarget.udp.natnet.version import Bitstream
 from tests.udp.natnet.captures import needs_captures, of_session
 from tests.udp.natnet.captures import session as captured
-from tests.udp.natnet.wire import NAMES, Wire, responder
+from tests.udp.natnet.distortions import DISTORTIONS
+from tests.udp.natnet.examples import every_command, rich_frame, rich_models
+from tests.udp.natnet.wire import CLIENT, NAMES, Wire, responder
 
 if TYPE_CHECKING:
     from retarget.frames import MarkerFrame
@@ -248,3 +250,27 @@ def test_the_same_datagrams_give_the_same_frames_to_the_last_bit() -> None:
     for first, second in zip(_recorded_frames(), _recorded_frames(), strict=True):
         assert (first.number, first.time_s, first.received_s) == (second.number, second.time_s, second.received_s)
         assert first.positions.tobytes() == second.positions.tobytes()
+
+
+@pytest.mark.parametrize("version", [Bitstream(2, 9), V30, V41], ids=str)
+def test_whatever_arrives_neither_end_fails_and_the_stream_goes_on(version: Bitstream) -> None:
+    rng = random.Random(3)
+    wire = _connected(version)
+    assert wire.server is not None
+    valid = [encode(m) for m in every_command() if not isinstance(m, Disconnect)]
+    valid += [encode(rich_frame(version), version), encode(rich_models(version), version), wire.server.definitions(version)]
+    for number in range(3000):
+        bent = rng.choice(DISTORTIONS)(rng, rng.choice(valid))
+        if bent[:2] == bytes([MessageId.DISCONNECT, 0]):
+            continue
+        wire.session.receive(bent, wire.now_s)
+        wire.session.sent(bent, wire.now_s)
+        wire.server.answer(bent, CLIENT, wire.now_s)
+        if number % 100 == 0:
+            wire.run(0.01)
+    wire.server = responder(version)
+    wire.run(30.0)
+    frame = wire.play(1_000_000)
+    assert wire.session.phase is Phase.CONNECTED
+    assert frame is not None
+    assert frame.layout.names == NAMES
