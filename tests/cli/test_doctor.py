@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def doctor(*arguments: str) -> Result:
-    return CliRunner().invoke(main, ["doctor", "--seconds", "0.3", *arguments])
+    return CliRunner().invoke(main, ["doctor", "--seconds", "0.2", *arguments])
 
 
 def sentence(result: Result) -> str:
@@ -142,5 +142,5 @@ def test_what_the_connection_says_itself_comes_only_when_asked_for() -> None:
     script = Script(tail=bytes(9))  # frames that cannot be read make the connection complain
     with BrokenServer(script) as server:
         assert len(doctor(server.url).stderr.splitlines()) == 1
-        told = CliRunner().invoke(main, ["-v", "doctor", "--seconds", "0.3", server.url])
+        told = CliRunner().invoke(main, ["-v", "doctor", "--seconds", "0.2", server.url])
     assert len(told.stderr.splitlines()) > 1

@@ -30,7 +30,7 @@ from retarget.udp.natnet.verdicts import (
     judge_version,
 )
 from retarget.udp.natnet.version import LATEST, OLDEST
-from retarget.udp.sockets import local_address_towards, resolve
+from retarget.udp.sockets import local_address_towards, open_udp, resolve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -108,6 +108,7 @@ class Examination:
         host = resolve(self._url.host)
         self._server = (host, self._url.port)
         self._local = self._url.local or local_address_towards(host)
+        open_udp(self._local).close()  # an address that is not ours is told here
         meant = "" if host == self._url.host else f"{self._url.host} is "
         return Step("address", Outcome.PASSED, f"{meant}{told(self._server)}, reached from {self._local}")
 
@@ -117,8 +118,10 @@ class Examination:
         except (ConnectionFailedError, InputError) as error:
             several = isinstance(error, InputError)
             cause = "one has to be chosen" if several else "none is on, or broadcasts do not get to its network"
-            what, _, advice = str(error).rstrip(".").partition(". ")
-            return Step("address", Outcome.FAILED, what, cause, advice)
+            advice = (
+                "name it, natnet://ADDRESS, or say on which network it is: natnet://?local=AN_ADDRESS_OF_OURS_THERE"
+            )
+            return Step("address", Outcome.FAILED, str(error).partition(". ")[0], cause, advice)
         self._server, self._local = found.address, found.local
         return Step("address", Outcome.PASSED, f"discovered {found}, reached from {self._local}")
 

@@ -30,9 +30,9 @@ def _only_loopback(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("retarget.udp.natnet.elsewhere.local_addresses", lambda: [LOOPBACK])
 
 
-def examine(address: str, *, watch_s: float = 0.25) -> dict[str, Step]:
+def examine(address: str, *, watch_s: float = 0.15, patience_s: float = 5.0) -> dict[str, Step]:
     """The steps by name; every examination has all of them."""
-    steps = list(Examination(address, watch_s=watch_s, patience_s=0.4).steps())
+    steps = list(Examination(address, watch_s=watch_s, patience_s=patience_s).steps())
     assert [step.name for step in steps] == NAMES
     return {step.name: step for step in steps}
 
@@ -113,7 +113,7 @@ def test_a_host_that_is_not_known_fails_at_the_address() -> None:
 
 
 def test_an_address_that_is_not_ours_is_told() -> None:
-    step = assert_ends_at(examine("natnet://127.0.0.1?local=192.0.2.99"), "answer")
+    step = assert_ends_at(examine("natnet://127.0.0.1?local=192.0.2.99"), "address")
     assert "192.0.2.99 is not an address of this machine" in step.found
 
 
@@ -127,14 +127,14 @@ def test_nobody_bound_is_told_from_silence() -> None:
 
 def test_a_port_that_swallows_everything_looks_like_a_firewall() -> None:
     with open_udp() as silent:
-        step = assert_ends_at(examine(f"natnet://{LOOPBACK}:{silent.address[1]}"), "answer")
+        step = assert_ends_at(examine(f"natnet://{LOOPBACK}:{silent.address[1]}", patience_s=0.4), "answer")
     assert "neither an answer nor a refusal" in step.found
     assert "firewall" in step.cause
 
 
 def test_a_server_that_answers_from_another_card_is_named() -> None:
     with BrokenServer(Script(answers_from="127.0.0.3")) as server:
-        step = assert_ends_at(examine(server.url), "answer")
+        step = assert_ends_at(examine(server.url, patience_s=0.4), "answer")
     assert "127.0.0.3" in step.found
     assert "natnet://127.0.0.3:" in step.advice
 
@@ -155,14 +155,14 @@ def test_too_old_a_version_fails_at_the_version() -> None:
 
 def test_a_version_of_the_future_whose_frames_cannot_be_read_fails_at_the_version() -> None:
     with BrokenServer(Script(version=(5, 0), tail=bytes(9))) as server:
-        step = assert_ends_at(examine(server.url), "version")
+        step = assert_ends_at(examine(server.url, watch_s=0.4), "version")
     assert "bitstream 5.0 is not known" in step.found
     assert "4.3" in step.advice
 
 
 def test_a_version_of_the_future_whose_frames_can_be_read_is_a_warning() -> None:
     with BrokenServer(Script(version=(4, 9))) as server:
-        step = assert_only(examine(server.url), WARNED, "version")
+        step = assert_only(examine(server.url, watch_s=0.4), WARNED, "version")
     assert "bitstream 4.9" in step.found
 
 
@@ -187,7 +187,7 @@ def test_markers_of_which_none_is_seen_are_told() -> None:
 
 def test_names_that_do_not_come_are_missed_and_the_rest_is_examined() -> None:
     with BrokenServer(Script(mute=(RequestModelDef,))) as server:
-        steps = examine(server.url)
+        steps = examine(server.url, patience_s=0.4)
     assert "no model definitions came" in steps["names"].found
     assert "larger than one packet" in steps["names"].cause
     assert outcomes(steps) == {
@@ -263,7 +263,7 @@ def test_a_server_that_answers_only_what_makes_a_client_is_examined_too() -> Non
 
 def test_a_server_that_answers_discovery_alone_counts_as_silent() -> None:
     with BrokenServer(Script(mute=(Connect,))) as server:
-        assert_ends_at(examine(server.url), "answer")
+        assert_ends_at(examine(server.url, patience_s=0.4), "answer")
 
 
 def test_what_is_no_address_is_refused_before_anything_is_opened() -> None:
