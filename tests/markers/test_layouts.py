@@ -39,12 +39,20 @@ def card(folder: Path, text: str) -> Path:
     return path
 
 
-def test_the_packaged_layouts_are_the_two() -> None:
-    assert available_layouts() == ("animface41", "face24")
+def test_the_packaged_layouts_are_two_of_markers_and_two_of_landmarks() -> None:
+    assert available_layouts() == ("animface41", "face24", "ibug68", "mediapipe478")
 
 
 def test_animface41_gives_every_site_once() -> None:
     assert sorted(load_layout("animface41").markers.sites) == sorted(SITES)
+
+
+def test_the_face_mesh_gives_every_site_once_and_the_68_landmarks_most() -> None:
+    mesh, few = load_layout("mediapipe478").markers, load_layout("ibug68").markers
+    assert (len(mesh.names), len(few.names)) == (478, 68)
+    assert sorted(site for site in mesh.sites if site) == sorted(SITES)
+    unseen = {site for site in SITES if site.startswith(("forehead", "cheek", "browCenter"))}
+    assert set(SITES) - set(few.sites) == unseen
 
 
 def test_face24_is_20_sites_and_a_head_band_of_4() -> None:
