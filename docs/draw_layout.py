@@ -52,7 +52,12 @@ def projected(p_rig: np.ndarray, rig: object) -> np.ndarray:
     return np.stack([VIEW.width / 2 + focal * p[:, 0] / -p[:, 2], VIEW.height / 2 + focal * p[:, 1] / p[:, 2]], axis=1)
 
 
-def label_column(pen: ImageDraw.ImageDraw, font: object, rows: list[tuple[str, np.ndarray]], side: int) -> None:
+def label_column(
+    pen: ImageDraw.ImageDraw,
+    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
+    rows: list[tuple[str, np.ndarray]],
+    side: int,
+) -> None:
     """Dots, and their names in a column at the picture's edge, a line from each name to its dot."""
     heights = np.linspace(60, VIEW.height - 60, len(rows))
     for (name, (x, y)), height in zip(rows, heights, strict=True):

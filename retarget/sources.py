@@ -169,8 +169,8 @@ class NatNetMarkers:
         return asdict(self._source.stats)
 
     def stop(self) -> None:
-        """Leave the server."""
-        self._source.close()
+        """End the iteration soon."""
+        self._source.stop()
 
     def __enter__(self) -> Self:
         self._source.__enter__()
