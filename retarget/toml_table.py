@@ -96,9 +96,15 @@ class Table:
         return value
 
     def array(self, key: str, *shapes: tuple[int, ...]) -> Array:
-        """The finite number or numbers `key`, in one of `shapes`: (), (3,) or (3, 3)."""
+        """The finite number or numbers `key`, in one of `shapes`: (), (2,), (3,), (6,) or (3, 3)."""
         value = self.get(key)
-        forms = {(): "a number", (3,): "three numbers", (3, 3): "three rows of three numbers"}
+        forms = {
+            (): "a number",
+            (2,): "two numbers",
+            (3,): "three numbers",
+            (6,): "six numbers",
+            (3, 3): "three rows of three numbers",
+        }
         array = _finite(value)
         if array is None or array.shape not in shapes:
             raise self.wrong(key, f"must be {' or '.join(forms[s] for s in shapes)}, all finite")

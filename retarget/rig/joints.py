@@ -3,7 +3,8 @@
 M and M0 are the marker now and in the neutral, in the performer's ``head``; J and J0 the facial joint at its site, in
 the rig's. The jaw turns instead, about its hinge, by the angle that `retarget.rig.jaw` reads at the chin. Joints that
 ride on the jaw get only what is left of the displacement once the measured jaw turn is taken back, or the lip would
-move twice. The head's own turn is shared out to neck and head. Metres and radians.
+move twice; a turn beyond the jaw's limits is not taken back, so a jaw that is pushed forward, which reads as closing,
+moves chin and lip by their joints. The head's own turn is shared out to neck and head. Metres and radians.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ class JointMapping:
         if frame.T_world_head is None or len(frame.positions) != len(self._layout.names):
             raise ValueError("The joint mapping takes stabilised frames of its own layout.")
         translations, rotations = (a.copy() for a in self._rest)
-        angle = self._jaw.measured(frame.positions) if self._jaw else math.nan
+        angle = self._jaw.possible(frame.positions) if self._jaw else math.nan
         self._sites.add_to(translations, frame.positions, 0.0 if math.isnan(angle) else angle)
         if self._jaw and not math.isnan(angle):
             rotations[self._jaw.joint.joint] = self._jaw.local(angle)
@@ -107,7 +108,10 @@ class _SiteMotion:
         self._riders = slice(0, sum(b.site.rides_jaw for b in bindings))
         self._hinge = _Hinge.of(performer.jaw) if performer.jaw else None
         scale = gain_matrix(performer.scale)
-        self._K = np.array([performer.K.get(b.site.name, scale) for b in bindings])
+        gains = [performer.K.get(b.site.name, scale) for b in bindings]
+        apart = any(K.ndim == 3 for K in gains)
+        self._K = np.array([K[0] if K.ndim == 3 else K for K in gains])
+        self._K_back = np.array([K[1] if K.ndim == 3 else K for K in gains]) if apart else None
         self._R_parent_rig = np.array([turns.parent_rest(joints, j).T for j in driven])
         self._mean = _mean_over_markers(driven, bindings)
         self._carriers = _carriers(joints, driven)
@@ -120,12 +124,19 @@ class _SiteMotion:
         moved = p - self._neutral  # (N, 3)
         seen = np.isfinite(moved.sum(axis=1))
         moved[~seen] = 0.0
-        moves = (self._K @ moved[:, :, None])[:, :, 0]
+        moves = self._scaled(moved)
         if self._mean is not None:
             moves = self._mean @ moves / np.maximum(self._mean @ seen, 1.0)[:, None]
         if self._carriers is not None:
             moves = moves - np.vstack([moves, np.zeros(3)])[self._carriers]
         translations[self._joints] += (self._R_parent_rig @ moves[:, :, None])[:, :, 0]
+
+    def _scaled(self, moved: Array) -> Array:
+        """K times the displacements (N, 3), with another K for what goes towards the negative side where there is one."""
+        if self._K_back is None:
+            return (self._K @ moved[:, :, None])[:, :, 0]
+        ahead = np.maximum(moved, 0.0)
+        return (self._K @ ahead[:, :, None] + self._K_back @ (moved - ahead)[:, :, None])[:, :, 0]
 
 
 class _Hinge(NamedTuple):
@@ -183,6 +194,13 @@ class _JawTurn(NamedTuple):
     def measured(self, positions: Array) -> float:
         """The performer's turn [rad]."""
         return self.reader(positions[self.markers])
+
+    def possible(self, positions: Array) -> float:
+        """The part of the performer's turn that the rig's jaw can follow [rad]."""
+        angle = self.measured(positions)
+        if math.isnan(angle) or self.min_rad <= self.gain * angle <= self.max_rad or self.gain == 0.0:
+            return angle
+        return min(max(self.gain * angle, self.min_rad), self.max_rad) / self.gain
 
     def local(self, angle: float) -> turns.Quat:
         """The jaw joint's rotation for the performer's turn `angle`."""

@@ -1,7 +1,7 @@
 """What cameras see of the performer: markers in the room, with noise, dropouts and outliers, and the truth beside them.
 
-The forward model is the mapping turned round: M = M0 + K^-1 (J - J0), carried by the performer's own jaw where the site
-rides on it, then by the head. Metres, seconds.
+The forward model is the mapping turned round: M = M0 + K^-1 (J - J0), K diagonal where its directions differ, carried
+by the performer's own jaw where the site rides on it, then by the head. Metres, seconds.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from retarget import geometry
 from retarget.frames import MarkerFrame
+from retarget.performer import moved_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,7 +70,7 @@ def captured(face: SyntheticFace, motion: FaceMotion) -> SyntheticTake:
         joints[site] = place.rest + moves
         if site in face.layout.sites:
             marker = face.layout.sites.index(site)
-            p_head[:, marker] += moves @ np.linalg.inv(face.performer.K[site]).T
+            p_head[:, marker] += moved_by(np.linalg.inv(face.performer.K[site]).astype(float), moves)
         if place.rides_jaw:
             joints[site] = _carried(joints[site], face.rig.jaw.axis, face.rig.jaw.pivot, motion.jaw_rad)
             if site in face.layout.sites:
