@@ -49,7 +49,7 @@ def soak(seconds: float) -> list[Recorded]:
         addresses = [stack.enter_context(Served(folder / "take.c3d")).address for _ in range(SERVERS)]
         takes = [folder / f"take{i}.mcap" for i in range(SERVERS)]
         recorders = [
-            subprocess.Popen([*COMMAND, "record", address, str(take)], stdout=subprocess.PIPE)
+            stack.enter_context(subprocess.Popen([*COMMAND, "record", address, str(take)], stdout=subprocess.DEVNULL))
             for address, take in zip(addresses, takes, strict=True)
         ]
         for each in recorders:
