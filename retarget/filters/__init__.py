@@ -3,7 +3,7 @@
 from retarget.filters.blink import BlinkTrick
 from retarget.filters.filter import Filter
 from retarget.filters.kalman import Kalman, VelocityKalman
-from retarget.filters.mean import ExponentialMean, FrameMean, MovingMean
+from retarget.filters.mean import ExponentialMean, MovingMean
 from retarget.filters.one_euro import OneEuro
 from retarget.filters.pd_mass import PdGains, PdMass, SteppedPdMass
 
@@ -11,7 +11,6 @@ __all__ = [
     "BlinkTrick",
     "ExponentialMean",
     "Filter",
-    "FrameMean",
     "Kalman",
     "MovingMean",
     "OneEuro",

@@ -1,4 +1,4 @@
-"""Means over the recent past: exponential, over a span of time, over a number of samples."""
+"""Means over the recent past: exponential, or over a span of time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from retarget.errors import InputError
 from retarget.filters.filter import Clock
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
@@ -75,29 +75,6 @@ class MovingMean:
         mean = _mean([sample for _, sample in self._samples])
         self._value = np.where(np.isnan(mean), self._value if len(self._value) else mean, mean)
         return self._value.copy()
-
-
-class FrameMean:
-    """A `Filter`: the mean of the last `count` samples, whatever their times; those before the first are `start`."""
-
-    def __init__(self, count: int, start: ArrayLike = 0.0) -> None:
-        """InputError where `count` is not above 0."""
-        if count < 1:
-            raise InputError(f"A mean needs at least one sample; the number given is {count}.")
-        self._count, self._start = count, np.asarray(start, float)
-        self.reset()
-
-    def reset(self) -> None:
-        """As `Filter`."""
-        self._samples: deque[Array] = deque(maxlen=self._count)
-
-    def __call__(self, values: Array, _time_s: float) -> Array:
-        """As `Filter`, but that every call is a sample."""
-        while len(self._samples) < self._count:
-            self._samples.append(np.full(len(values), self._start))
-        self._samples.append(np.where(np.isnan(values), self._samples[-1], values))
-        mean: Array = np.mean(self._samples, axis=0)
-        return mean
 
 
 def _mean(samples: list[Array]) -> Array:

@@ -16,6 +16,10 @@ rig.toml, version 1::
     max_deg = 35
     [sites]                            # site = joint that a marker there drives
     noseTip = "noseTip"
+    [responses]                        # may be left out; see `retarget.rig.responses`
+    jawOpen = { measure = "mouth_width", curve = "ramp", start = 0.02, end = 0.3 }
+    [secondary]                        # joints that trail, may be left out; see `retarget.rig.secondary`
+    pendantLeft = { alpha = 0.9 }
     [licence]                          # any texts: name, source, author, ...
     name = "CC0-1.0"
 """
@@ -33,6 +37,8 @@ from retarget.errors import InputError
 from retarget.rig.glb import read_glb
 from retarget.rig.model import Jaw, Rig, Site
 from retarget.rig.nodes import read_nodes, read_skeleton
+from retarget.rig.responses import read_responses
+from retarget.rig.secondary import read_gains
 from retarget.rig.surfaces import read_surfaces
 from retarget.toml_table import read_table
 
@@ -41,6 +47,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from retarget.filters import PdGains
     from retarget.rig.model import Joints, Surface
     from retarget.toml_table import Table
 
@@ -128,12 +135,13 @@ def _beside(mesh: Path) -> Path:
 
 def _read_rig(path: Path) -> Rig:
     root = read_table(path, "rig file")
-    root.only("version", "name", "mesh", "joints", "jaw", "sites", "licence")
+    root.only("version", "name", "mesh", "joints", "jaw", "sites", "responses", "secondary", "licence")
     if root.values.get("version", 1) != 1:
         raise root.wrong("version", "must be 1, the only version there is")
     named = _named_joints(root)
     file = root.string("mesh")
-    mesh = _read_mesh(path.parent / file, {table.string(key) for table, key in named.values()})
+    trailing = root.table("secondary").values
+    mesh = _read_mesh(path.parent / file, {table.string(key) for table, key in named.values()} | set(trailing))
     joints = mesh.joints
     places = {what: _joint(mesh, table, key, file) for what, (table, key) in named.items()}
     origin = joints.T_rig_joint[places["head"], :3, 3]
@@ -149,6 +157,8 @@ def _read_rig(path: Path) -> Rig:
         eye_joints=(places.get("eye_left"), places.get("eye_right")),
         jaw=_jaw(root.table("jaw"), joints, places["jaw"], origin) if "jaw" in places else None,
         licence=_licence(root.table("licence")),
+        responses=read_responses(root.table("responses"), mesh.shape_names),
+        secondary=_secondary(root.table("secondary"), joints, places),
     )
 
 
@@ -215,6 +225,19 @@ def _jaw(table: Table, joints: Joints, joint: int, origin: Array) -> Jaw:
         raise table.wrong("max_deg", "and 'min_deg' must enclose 0, the mouth shut, and stay within 90 of it")
     pivot = joints.T_rig_joint[joint, :3, 3] - origin
     return Jaw(joint, axis / length, pivot, float(np.radians(least)), float(np.radians(most)))
+
+
+def _secondary(table: Table, joints: Joints, places: dict[str, int]) -> dict[int, PdGains]:
+    driven = {joint: what for what, joint in places.items()}
+    gains = {}
+    for name in table.values:
+        if name not in joints.names:
+            raise table.wrong(name, f"is no joint of the mesh{_near(name, joints.names)}")
+        joint = joints.index(name)
+        if joint in driven:
+            raise table.wrong(name, f"is driven already, as {driven[joint]}, and cannot trail")
+        gains[joint] = read_gains(table.table(name))
+    return gains
 
 
 def _licence(table: Table) -> dict[str, str]:

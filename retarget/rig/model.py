@@ -10,10 +10,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from pathlib import Path
 
     import numpy as np
     from numpy.typing import NDArray
+
+    from retarget.filters import PdGains
+    from retarget.rig.responses import Response
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,3 +132,7 @@ class Rig:
     jaw: Jaw | None
     licence: dict[str, str] = field(default_factory=dict)
     """What rig.toml says of licence, source and authors."""
+    responses: Mapping[str, Response] = field(default_factory=dict)
+    """By shape: the measure of the face that drives it; empty where rig.toml says nothing of it."""
+    secondary: Mapping[int, PdGains] = field(default_factory=dict)
+    """By joint: how it trails after the motion of the head, as hair and pendants do."""

@@ -15,7 +15,6 @@ from retarget.filters import (
     BlinkTrick,
     ExponentialMean,
     Filter,
-    FrameMean,
     Kalman,
     MovingMean,
     OneEuro,
@@ -44,7 +43,6 @@ IN_TIME: dict[str, Callable[[], Filter]] = {
 }
 BY_SAMPLE: dict[str, Callable[[], Filter]] = {
     "stepped pd": lambda: SteppedPdMass(PdGains(), np.array([2.0, 2.0])),
-    "frame mean": lambda: FrameMean(5),
 }
 ALL = IN_TIME | BY_SAMPLE
 
@@ -137,7 +135,6 @@ def test_the_answer_to_a_ramp_hardly_depends_on_the_rate(name: str, rate_hz: flo
         lambda: ExponentialMean(0.0),
         lambda: ExponentialMean.of_gain(1.0, 60.0),
         lambda: MovingMean(0.0),
-        lambda: FrameMean(0),
         lambda: Kalman(0.0, 1.0),
         lambda: VelocityKalman(1.0, float("nan")),
     ],

@@ -5,14 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from retarget.filters import ExponentialMean, FrameMean, MovingMean
-
-
-def test_the_mean_of_five_frames_starts_at_zeros_as_openvheads_does() -> None:
-    mean = FrameMean(5)
-    values = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]
-    given = [mean(np.array([v]), 0.0)[0] for v in values]
-    np.testing.assert_allclose(given, [2, 6, 12, 20, 30, 40])
+from retarget.filters import ExponentialMean, MovingMean
 
 
 def test_the_mean_of_a_span_of_time_takes_in_what_lies_in_it() -> None:
