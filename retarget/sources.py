@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import threading
 import time
+from abc import ABC, abstractmethod
 from dataclasses import asdict
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -59,95 +60,97 @@ class Source(Protocol):
         """The frames, as they come."""
 
 
-class ClipSource:
-    """A take in memory, frame by frame, as fast as they are taken."""
+class Recorded(ABC):
+    """What lies on the disk: frames as fast as they are taken."""
 
     live = False
+    frame_count: int | None = None
+
+    def __init__(self) -> None:
+        self._stopped = False
+
+    @property
+    @abstractmethod
+    def rate_hz(self) -> float | None:
+        """The recording's own rate [Hz]."""
+
+    @abstractmethod
+    def counts(self) -> dict[str, int]:
+        """What happened to the frames when they were recorded, and how many have been given."""
+
+    @abstractmethod
+    def _frames(self) -> Iterator[MarkerFrame]:
+        """All frames in order."""
+
+    def stop(self) -> None:
+        """No frame after the current one."""
+        self._stopped = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        pass
+
+    def __iter__(self) -> Iterator[MarkerFrame]:
+        for frame in self._frames():
+            if self._stopped:
+                return
+            yield frame
+
+
+class ClipSource(Recorded):
+    """The markers of a file, in memory."""
 
     def __init__(self, clip: MarkerClip) -> None:
+        super().__init__()
         self._clip = clip
-        self._stopped = False
         self._given = 0
+        self.frame_count = len(clip)
 
     @property
     def rate_hz(self) -> float | None:
         """The take's own rate [Hz]."""
         return self._clip.rate_hz
 
-    @property
-    def frame_count(self) -> int | None:
-        """All frames of the take."""
-        return len(self._clip)
-
     def counts(self) -> dict[str, int]:
         """A file loses nothing."""
         return {"received": self._given}
 
-    def stop(self) -> None:
-        """No frame after the current one."""
-        self._stopped = True
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        pass
-
-    def __iter__(self) -> Iterator[MarkerFrame]:
-        for frame in self._clip:
-            if self._stopped:
-                return
-            self._given += 1
+    def _frames(self) -> Iterator[MarkerFrame]:
+        for self._given, frame in enumerate(self._clip, 1):
             yield frame
 
 
-class TakeSource:
+class TakeSource(Recorded):
     """A recorded session, decoded again as it is read."""
-
-    live = False
-    frame_count = None
 
     def __init__(self, take: Take) -> None:
         from retarget.take.decode import TakeFrames
 
-        self._frames = TakeFrames(take)
-        self._stopped = False
+        super().__init__()
+        self._take = TakeFrames(take)
 
     @property
     def rate_hz(self) -> float | None:
-        """As the server told [Hz]."""
-        return self._frames.rate_hz
+        """As the server told, or as its frames came [Hz]."""
+        return self._take.rate_hz
 
     def counts(self) -> dict[str, int]:
         """What became of the datagrams on their way to the recorder."""
-        framing = self._frames.session.framing
+        framing = self._take.session.framing
         return {
             "received": framing.delivered,
             "lost": framing.lost,
             "doubled": framing.doubled,
             "late": framing.late,
-            "malformed": self._frames.session.malformed,
+            "malformed": self._take.session.malformed,
         }
 
-    def stop(self) -> None:
-        """No frame after the current one."""
-        self._stopped = True
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        pass
-
-    def __iter__(self) -> Iterator[MarkerFrame]:
-        for frame in self._frames:
-            if self._stopped:
-                return
-            yield frame
+    def _frames(self) -> Iterator[MarkerFrame]:
+        return iter(self._take)
 
 
 class NatNetMarkers:
