@@ -92,7 +92,7 @@ class Recorded(ABC):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        pass
+        self.stop()
 
     def __iter__(self) -> Iterator[MarkerFrame]:
         for frame in self._frames():
@@ -120,7 +120,8 @@ class ClipSource(Recorded):
         return {"received": self._given}
 
     def _frames(self) -> Iterator[MarkerFrame]:
-        for self._given, frame in enumerate(self._clip, 1):
+        for frame in self._clip:
+            self._given += 1
             yield frame
 
 
