@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from retarget.camera.landmarks import IBUG68, Landmarks
+from retarget.camera.quiet import no_stdout
 from retarget.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,10 +23,14 @@ if TYPE_CHECKING:
 CASCADE = "haarcascade_frontalface_alt2.xml"
 SMALLEST_SHARE = 0.15
 """Side of the smallest face that is looked for, over the picture's shorter side."""
+HEAD_BYTES = 1024
+"""In which a model tells its size; OpenCV would take any other YAML file for an empty model."""
+TURNS_DEG = (0.0, 20.0, -20.0)
+"""By which the picture is turned until the cascade, which only knows upright faces, sees one."""
 
 
 class Facemark:
-    """A `Detector` in the layout ibug68, without depth. It looks at each picture for itself."""
+    """A `Detector` in the layout ibug68, without depth."""
 
     def __init__(self, model: Path) -> None:
         """InputError where the LBF model is not at `model` or cannot be read, or OpenCV lacks either part."""
@@ -33,6 +38,9 @@ class Facemark:
 
         if not model.is_file():
             raise InputError(f"There is no LBF model {model}; give the path of a FacemarkLBF .yaml file.")
+        with model.open("rb") as file:
+            if b"n_landmarks: 68" not in file.read(HEAD_BYTES):
+                raise InputError(f"{model} is no model of FacemarkLBF: it does not begin as one with 68 landmarks.")
         cascade = Path(getattr(getattr(cv2, "data", None), "haarcascades", "")) / CASCADE
         if not cascade.is_file() or not hasattr(cv2, "face"):
             raise InputError(
@@ -41,9 +49,11 @@ class Facemark:
         self._cascade = cv2.CascadeClassifier(str(cascade))
         self._facemark: Any = cv2.face.createFacemarkLBF()
         try:
-            self._facemark.loadModel(str(model))
+            with no_stdout():
+                self._facemark.loadModel(str(model))
         except cv2.error as error:
             raise InputError(f"{model} is no model of FacemarkLBF: {error.err}.") from error
+        self.reset()
 
     @property
     def layout(self) -> MarkerLayout:
@@ -51,21 +61,43 @@ class Facemark:
         return IBUG68
 
     def reset(self) -> None:
-        """Nothing is remembered."""
+        """Begin with an upright face again."""
+        self._turn_deg = 0.0
 
     def __call__(self, picture: NDArray[np.uint8]) -> Landmarks | None:
         """The landmarks of the largest face in `picture` (H, W, 3) BGR; None where there is none."""
+        for turn_deg in sorted(TURNS_DEG, key=lambda turn: turn != self._turn_deg):  # what fitted last is tried first
+            points = self._look(picture, turn_deg)
+            if points is not None:
+                self._turn_deg = turn_deg
+                return Landmarks(IBUG68, points, 1.0)
+        return None
+
+    def _look(self, picture: NDArray[np.uint8], turn_deg: float) -> NDArray[np.float64] | None:
+        """(68, 3) [px] in `picture` turned about its middle, and turned back."""
         import cv2
 
-        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
-        least = max(20, int(SMALLEST_SHARE * min(grey.shape)))
-        boxes = np.asarray(self._cascade.detectMultiScale(grey, 1.1, 3, minSize=(least, least)))
-        if not len(boxes):
+        height, width = picture.shape[:2]
+        turn: NDArray[np.float64] = np.array(cv2.getRotationMatrix2D((width / 2, height / 2), turn_deg, 1.0), float)
+        turned = np.asarray(cv2.warpAffine(picture, turn, (width, height)) if turn_deg else picture, np.uint8)
+        box = self._largest_face(turned)
+        if box is None:
             return None
-        largest = boxes[np.argmax(boxes[:, 2] * boxes[:, 3])]
-        found, faces = self._facemark.fit(picture, largest[None])
+        found, faces = self._facemark.fit(turned, box[None])
         if not found:
             return None
         points = np.full((len(IBUG68.names), 3), np.nan)
-        points[:, :2] = faces[0][0]
-        return Landmarks(IBUG68, points, 1.0)
+        points[:, :2] = (faces[0][0].astype(float) - turn[:, 2]) @ turn[:, :2]
+        return points
+
+    def _largest_face(self, picture: NDArray[np.uint8]) -> NDArray[np.int32] | None:
+        """x, y, width and height [px]."""
+        import cv2
+
+        grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
+        least = max(20, int(SMALLEST_SHARE * min(picture.shape[:2])))
+        boxes = np.asarray(self._cascade.detectMultiScale(grey, 1.1, 3, minSize=(least, least)), np.int32)
+        if not len(boxes):
+            return None
+        largest: NDArray[np.int32] = boxes[np.argmax(boxes[:, 2] * boxes[:, 3])]
+        return largest

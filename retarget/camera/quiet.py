@@ -1,7 +1,8 @@
-"""OpenCV without its own words on what it fails to open: ours are enough."""
+"""OpenCV without its own words on what it opens or fails to open: ours are enough, and numbers go to stdout."""
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -20,3 +21,16 @@ def quiet() -> Iterator[None]:
         yield
     finally:
         logging.setLogLevel(before)
+
+
+@contextmanager
+def no_stdout() -> Iterator[None]:
+    """What native code prints to stdout meanwhile goes nowhere; other threads must not print."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:  # noqa: PTH123 - not a path of anybody's
+        kept = os.dup(1)
+        os.dup2(nowhere.fileno(), 1)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 1)
+            os.close(kept)

@@ -61,7 +61,7 @@ def test_a_film_that_is_cut_short_gives_what_it_has(tmp_path: Path) -> None:
     whole = film(tmp_path / "film.avi", count=30)
     whole.write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
     with FilmPictures(whole) as pictures:
-        assert 5 < len(list(pictures)) < 30
+        assert 0 < len(list(pictures)) < 30
 
 
 def test_the_pictures_of_a_folder_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
