@@ -16,14 +16,14 @@ from calib.face import face_sites, site_moves
 from calib.fixed import with_fixed
 from calib.gains import STRENGTH, Gains, site_graph, solve_gains
 from calib.jaw import fit_jaw, jaw_gain, widest
-from calib.matching import Motion, episodes, find_matches, moves_in
+from calib.matching import Motion, find_matches, moves_in
 from calib.material import RangeTake, lay_out
 from calib.pairs import concerned, make_pairs, pairs_of_matches
 from calib.protrusion import jaw_motion
 from calib.reference_poses import choose_strength, held_frames, rig_pose
 from calib.rig_range import RigRange
 from calib.rolling import rolling_mean
-from calib.score import HeldOut, held_out
+from calib.score import HeldOut, deal, held_out
 from retarget.errors import InputError
 from retarget.performer import Performer, PerformerJaw, gain_matrix
 from retarget.rig.fit import performer_from_neutral
@@ -133,7 +133,7 @@ def calibrate(
     gains = solve_gains(pairs.turned(R), graph, default.scale, strength)
     on_step(STEPS[4])
     rest = default.neutral[face.markers]
-    score = held_out(_hands(motion, matches, extremes, face.names), graph, default.scale, rest, rig_range.rest)
+    score = held_out(deal(motion, matches, extremes, face.names), graph, default.scale, rest, rig_range.rest)
     turned = _Turned(R, default.neutral[face.markers].mean(axis=0))
     seen = _farthest(motion.moves @ R.T, motion.times)
     performer, wanted = _performer(default, turned, face, gains, jaw, rig_range, matches, settings)
@@ -241,24 +241,6 @@ def _all_pairs(poses: Pairs, found: Pairs) -> Pairs:
     """The reference poses, and of the expressions found those that no pose of the same name tells better."""
     rest = found.only(np.array([name not in poses.names for name in found.names], bool))
     return poses.joined(rest) if poses.names else found
-
-
-def _hands(
-    motion: Motion, matches: Sequence[Match], extremes: Sequence[RigExtreme], sites: Sequence[str]
-) -> tuple[Pairs, Pairs]:
-    """The episodes of every expression dealt into two hands, in turns that go on from one to the next."""
-    hands = []
-    for hand in (0, 1):
-        dealt = [_dealt(motion, match, hand, number) for number, match in enumerate(matches)]
-        hands.append(pairs_of_matches(matches, extremes, sites, dealt))
-    return hands[0], hands[1]
-
-
-def _dealt(motion: Motion, match: Match, hand: int, number: int) -> Array:
-    """(S, 3) [m] of every second episode of a match; NaN where there is none."""
-    times = episodes(match, motion.times) if match.exercised else []
-    mine = times[(hand + (number if len(times) == 1 else 0)) % 2 :: 2]
-    return moves_in(motion, np.concatenate(mine)) if mine else np.full(match.moves.shape, np.nan)
 
 
 def _farthest(moves: Array, times: Array) -> Array:

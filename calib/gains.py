@@ -4,10 +4,12 @@ For each axis and direction K minimises, over the poses e and the sites s,
 
     sum w (y_es - K_s x_es)^2 + strength sum_edges (K_i - K_j)^2 + anchor sum_s (K_s - K_0)^2,
 
-x the performer's displacement, y the rig's, both in millimetres, w the trust in the pose times Huber's weight. The
-edges join what acts alike: neighbours of one region, the same place on the other side, up and down of one site. So a
-value that the data tell is theirs, one that they hardly tell is its region's, and one of a region that never moved
-stays at K_0, the ratio of sizes. Ridge regression with a graph Laplacian; Huber 1964.
+x the performer's displacement, y the rig's, both in millimetres, w the trust in the pose times Huber's weight. A
+pair counts along an axis where the rig moves, and where both move the same way: what goes another way is a difference
+of style, and no gain undoes it. The edges join what acts alike: neighbours of one region, the same place on the other
+side, up and down of one site. So a value that the data tell is theirs, one that they hardly tell is its region's, and
+one of a region that never moved stays at K_0, the ratio of sizes.
+Ridge regression with a graph Laplacian; Huber 1964.
 """
 
 from __future__ import annotations
@@ -35,6 +37,8 @@ ANCHOR = 0.003
 REWEIGHTINGS = 6
 HUBER = 1.345
 LEAST_SPREAD_MM = 0.3
+LEAST_MM = 0.4
+"""The rig hardly moves along an axis where it moves by less [mm]."""
 NEIGHBOURS = 3
 SAME_SITE = 0.5
 """Weight of the edge between both directions of one axis at one site."""
@@ -53,14 +57,14 @@ class Gains:
 def solve_gains(pairs: Pairs, graph: Array, default: float, strength: float = STRENGTH) -> Gains:
     """Gains out of `pairs`; `graph` is that of `site_graph`, `default` is K_0."""
     x, y = 1e3 * pairs.seen, 1e3 * pairs.rig
-    directions = np.stack([x > 0, x < 0])  # (2, P, S, 3)
+    directions = np.stack([(x > 0) & (y > LEAST_MM), (x < 0) & (y < -LEAST_MM)])  # (2, P, S, 3)
     trust = pairs.weights[..., None] * np.ones(3)
     huber = np.ones_like(x)
     K = np.full((2, *x.shape[1:]), default)
     for _ in range(REWEIGHTINGS):
         K, confidence = _solve(directions * (trust * huber), x, y, graph, default, strength)
         residual = np.abs(y - predicted(K, x))
-        counted = residual[(trust > 0) & (np.abs(x) > LEAST_SPREAD_MM)]
+        counted = residual[(trust > 0) & directions.any(axis=0)]
         spread = max(LEAST_SPREAD_MM, 1.4826 * float(np.median(counted))) if counted.size else LEAST_SPREAD_MM
         huber = np.minimum(1.0, HUBER * spread / np.maximum(residual, 1e-9))
     return Gains(K, confidence)

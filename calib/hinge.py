@@ -20,7 +20,7 @@ from retarget.errors import RetargetError
 from retarget.rig.jaw import signed_angle
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
 
@@ -37,9 +37,11 @@ SIDEWAYS = 0.35
 """Part of the way that a chin which opens may go sideways."""
 LOSS_M = 0.0007
 """A marker this far off its arc counts half [m]."""
+SHARED_ABSORBED = 2.0
+"""A wrong hinge hides part of what the skin does; so much more there is than is left."""
 STEPS = 25
 DONE = 1e-4
-PRIOR_PIVOT_M = 0.02
+PRIOR_PIVOT_M = 0.012
 PRIOR_AXIS_RAD = np.radians(4.0)
 FINEST_M = 0.00005
 """No skin follows a bone more closely [m]."""
@@ -71,6 +73,9 @@ class Hinge:
     """Median distance of the chin from its arc while it opens [m]."""
     axis_sd_rad: float
     pivot_sd_m: float
+    """Standard deviations [rad] and [m], across the axis, in the direction that is known worst."""
+    path_sd_m: float
+    """That of the pivot by the path alone, without the rig's hinge for a prior [m]."""
     opening_rad: float
     """Largest turn that was seen, of those that last."""
 
@@ -82,21 +87,23 @@ def fit_hinge(rest: Array, path: Array, rate_hz: float, axis: Array, pivot: Arra
     turns, and where the path leaves the hinge open by more than `UNCERTAIN_M`.
     """
     rest, rest_sd = _rest_on_path(rest, path, rate_hz)
-    chosen = _opening_frames(rest, path, axis, pivot)
-    model = _Model(rest, path[chosen], axis, pivot)
+    chosen, groups = _opening_frames(rest, path, axis, pivot)
+    model = _Model(rest, path[chosen], groups, axis, pivot)
     fit = _fit(model, len(chosen) * min(INDEPENDENT_HZ / rate_hz, 1.0), rest_sd)
     axis, pivot = model.line(fit.parameters)
     turns = signed_angle(rest - pivot, path - pivot, axis)
     opening = float(np.nanquantile(turns, 0.995))
     if opening < LEAST_OPENING_RAD:
         raise _hardly_opened(opening)
-    if fit.pivot_sd_m > UNCERTAIN_M:
+    if fit.path_sd_m[0] > UNCERTAIN_M:
         raise HingeNotObservableError(
-            f"The hinge of the jaw is not observable: the chin's path leaves it open by {1000 * fit.pivot_sd_m:.0f} mm "
-            "(opened and closed a few times, wide and slowly, it shows it); the rig's hinge is kept."
+            f"The hinge of the jaw is not observable: the chin's path leaves it open by {1e3 * fit.path_sd_m[0]:.0f} mm; "
+            "open and close a few times, wide and slowly. The rig's hinge is kept."
         )
     off = np.linalg.norm(model.misfit(fit.parameters), axis=2)
-    return Hinge(axis, pivot, float(np.median(off[off > 0])), fit.axis_sd_rad, fit.pivot_sd_m, opening)
+    return Hinge(
+        axis, pivot, float(np.median(off[off > 0])), fit.axis_sd_rad, fit.pivot_sd_m, fit.path_sd_m[1], opening
+    )
 
 
 def _rest_on_path(rest: Array, path: Array, rate_hz: float) -> tuple[Array, float]:
@@ -119,8 +126,8 @@ def _hardly_opened(opening: float) -> HingeNotObservableError:
     )
 
 
-def _opening_frames(rest: Array, path: Array, axis: Array, pivot: Array) -> NDArray[np.intp]:
-    """Frames in which the chin opens rather than slides, spread evenly over how far."""
+def _opening_frames(rest: Array, path: Array, axis: Array, pivot: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Frames in which the chin opens rather than slides, spread evenly over how far, and the group of each."""
     turns = signed_angle(rest - pivot, path - pivot, axis)
     seen = np.isfinite(path.sum(axis=2))
     moved = np.where(seen[..., None], path - rest, 0.0).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[:, None]
@@ -130,7 +137,8 @@ def _opening_frames(rest: Array, path: Array, axis: Array, pivot: Array) -> NDAr
     opens = opens[straight[opens]]
     if len(opens) < LEAST_FRAMES:
         raise _hardly_opened(widest)
-    return np.concatenate([_thinned(part) for part in _by_turn(opens, turns[opens])])
+    parts = [_thinned(part) for part in _by_turn(opens, turns[opens])]
+    return np.concatenate(parts), np.repeat(np.arange(GROUPS), [len(part) for part in parts])
 
 
 def _by_turn(frames: NDArray[np.intp], turns: Array) -> list[NDArray[np.intp]]:
@@ -153,6 +161,8 @@ class _Model:
 
     rest: Array
     path: Array
+    groups: NDArray[np.intp]
+    """(F,) which frames have about the same turn."""
     axis: Array
     pivot: Array
 
@@ -176,7 +186,8 @@ class _Fit:
     parameters: Array
     axis_sd_rad: float
     pivot_sd_m: float
-    """Standard deviations by the path alone, without the prior on the hinge."""
+    path_sd_m: tuple[float, float]
+    """Standard deviations of the pivot by the path alone, in the direction known best and in that known worst."""
 
 
 def _fit(model: _Model, independent: float, rest_sd: float) -> _Fit:
@@ -192,9 +203,20 @@ def _fit(model: _Model, independent: float, rest_sd: float) -> _Fit:
         parameters = parameters + step * min(1.0, 1.0 / float(np.abs(step / scales).max()) if step.any() else 1.0)
         if np.abs(step / scales).max() < DONE:
             break
-    covariance = np.linalg.inv(information + np.diag(rest_prior) + 1e-6 * np.eye(len(prior)))
-    spread = np.sqrt(np.diag(covariance))
-    return _Fit(parameters, float(np.hypot(*spread[:2])), float(np.hypot(*spread[2:4])))
+    covariance = np.linalg.inv(information + np.diag(prior))
+    alone = np.linalg.inv(information + np.diag(rest_prior) + 1e-6 * np.eye(len(prior)))
+    return _Fit(
+        parameters,
+        axis_sd_rad=_spreads(covariance[:2, :2])[1],
+        pivot_sd_m=_spreads(covariance[2:4, 2:4])[1],
+        path_sd_m=_spreads(alone[2:4, 2:4]),
+    )
+
+
+def _spreads(covariance: ArrayLike) -> tuple[float, float]:
+    """Standard deviations along the best and the worst direction of a (2, 2)."""
+    best, worst = np.sqrt(np.linalg.eigvalsh(np.asarray(covariance, float)).clip(0.0))
+    return float(best), float(worst)
 
 
 def _normal_equations(model: _Model, parameters: Array, independent: float) -> tuple[Array, Array]:
@@ -203,11 +225,26 @@ def _normal_equations(model: _Model, parameters: Array, independent: float) -> t
     misfit = model.misfit(parameters)
     moved = np.diag(steps) + parameters
     J = np.stack([(model.misfit(p) - misfit).ravel() / step for p, step in zip(moved, steps, strict=True)], axis=1)
-    off = np.linalg.norm(misfit, axis=2)
-    weights = np.where(off > 0, 1.0 / (1.0 + (off / LOSS_M) ** 2), 0.0)
-    variance = float((weights * off**2).sum() / max(3 * weights.sum(), 1e-9)) + FINEST_M**2
-    weight = np.repeat(weights.ravel(), 3) / variance * (independent / len(model.path))
+    weight = np.repeat(_weights(misfit, model.groups, independent).ravel(), 3)
     return (J * weight[:, None]).T @ J, -(J * weight[:, None]).T @ misfit.ravel()
+
+
+def _weights(misfit: Array, groups: NDArray[np.intp], independent: float) -> Array:
+    """(F, N) [1/m^2]: Cauchy's weights over variances, so that a group of frames of one turn counts as its mean does.
+
+    That mean is off by the noise, which many frames even out, and by what the skin does beside the bone at this turn,
+    which they do not: the misfit that all frames of a group share.
+    """
+    off = np.linalg.norm(misfit, axis=2)
+    robust = np.where(off > 0, 1.0 / (1.0 + (off / LOSS_M) ** 2), 0.0)
+    members = groups == np.arange(GROUPS)[:, None]  # (G, F)
+    total = np.maximum(members @ robust, 1e-9)
+    mean = np.einsum("gf,fn,fnx->gnx", members, robust, misfit) / total[..., None]
+    shared = SHARED_ABSORBED * float((mean**2).mean(axis=2)[total > 1].mean()) if (total > 1).any() else 0.0
+    noise = float((robust * off**2).sum() / max(3 * robust.sum(), 1e-9)) + FINEST_M**2
+    variance = noise / np.maximum(total * (independent / len(misfit)), 1.0) + shared  # (G, N), of a group's mean
+    weights: Array = robust / (variance * total)[groups]
+    return weights
 
 
 def _across(axis: Array) -> Array:

@@ -1,8 +1,9 @@
 """How well a calibration predicts what it has not seen, in millimetres of the rig, against simpler ways.
 
-The times that the performer made each expression are dealt into two hands; K is fitted to one and asked for the other,
-then the other way round. Beside it stand K = 1, K = the ratio of sizes, and a warp of the performer's neutral onto the
-rig's by radial basis functions (thin plates), which carries every marker along.
+The times that the performer made an expression are dealt into two hands; K is fitted to one and asked for the other,
+then the other way round. What was made only once is fitted to and never asked for. Beside
+it stand K = 1, K = the ratio of sizes, and a warp of the performer's neutral onto the rig's by radial basis functions
+(thin plates), which carries every marker along.
 """
 
 from __future__ import annotations
@@ -14,11 +15,17 @@ import numpy as np
 
 from calib.axes import refine_axes
 from calib.gains import predicted, solve_gains
+from calib.matching import episodes, moves_in
+from calib.pairs import pairs_of_matches
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from calib.matching import Match, Motion
     from calib.pairs import Pairs
+    from calib.rig_range import RigExtreme
 
     Array = NDArray[np.float64]
 
@@ -38,16 +45,42 @@ class HeldOut:
     """Poses that were held out."""
 
 
-def held_out(hands: tuple[Pairs, Pairs], graph: Array, scale: float, rest: Array, rig_rest: Array) -> HeldOut | None:
-    """The score; `rest` (S, 3) and `rig_rest` (S, 3) are the neutral sites of both. None where a hand is empty.
+@dataclass(frozen=True, slots=True, eq=False)
+class Hands:
+    """The same expressions, seen at different times, and those that were made only once."""
 
-    The warp is of the neutral in `rest`, whose axes are those of the pairs.
+    first: Pairs
+    second: Pairs
+    once: Pairs
+
+
+def deal(motion: Motion, matches: Sequence[Match], extremes: Sequence[RigExtreme], sites: Sequence[str]) -> Hands:
+    """The episodes of every match, dealt in turns."""
+    times = [episodes(match, motion.times) if match.exercised else [] for match in matches]
+    nothing = np.full((len(sites), 3), np.nan)
+
+    def pairs(chosen: list[list[NDArray[np.intp]]]) -> Pairs:
+        moves = [moves_in(motion, np.concatenate(frames)) if frames else nothing for frames in chosen]
+        return pairs_of_matches(matches, extremes, sites, moves)
+
+    return Hands(
+        first=pairs([frames[::2] if len(frames) > 1 else [] for frames in times]),
+        second=pairs([frames[1::2] for frames in times]),
+        once=pairs([frames if len(frames) == 1 else [] for frames in times]),
+    )
+
+
+def held_out(hands: Hands, graph: Array, scale: float, rest: Array, rig_rest: Array) -> HeldOut | None:
+    """The score, None where no expression was made twice; `rest` and `rig_rest` (S, 3) [m] are both neutrals.
+
+    The axes of `rest` are those of the pairs.
     """
     squares: dict[str, list[Array]] = {"calibrated": [], "one": [], "scale": [], "warp": []}
     poses = 0
-    for fitted, asked in (hands, hands[::-1]):
-        if not fitted.names or not asked.names:
-            return None
+    if not hands.first.names or not hands.second.names:
+        return None
+    for known, asked in ((hands.first, hands.second), (hands.second, hands.first)):
+        fitted = known.joined(hands.once)
         R = refine_axes(fitted, graph, scale)
         turned = asked.turned(R)
         K = solve_gains(fitted.turned(R), graph, scale).K
