@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -20,8 +20,8 @@ from retarget.markers.label import Labeller
 from retarget.markers.layouts import detect_layout, load_layout
 from retarget.markers.neutral import StillMoment
 from retarget.markers.stabilise import Stabiliser
+from retarget.rig.drive import Drive
 from retarget.rig.fit import performer_from_neutral
-from retarget.rig.joints import JointMapping
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from retarget.markers.layouts import Layout
     from retarget.markers.neutral import Neutral
     from retarget.performer import JawMode, Performer
+    from retarget.rig.drive import DriveMode
     from retarget.rig.model import Rig
+    from retarget.rig.pose_smoother import Smoothing
 
     Array = NDArray[np.float64]
 
@@ -40,6 +42,16 @@ log = logging.getLogger("retarget.session")
 
 MOST_WAITING = 6000
 """Frames kept until the neutral is found; on a stage where nobody is in view yet, older ones are let go."""
+
+
+@dataclass(frozen=True, slots=True)
+class SolveSettings:
+    """How markers move the face, besides what the performer says."""
+
+    drive: DriveMode = "joints"
+    smooth: Smoothing = "none"
+    jaw: JawMode | None = None
+    """How the jaw's angle is read; None as the performer has it."""
 
 
 class Session:
@@ -50,16 +62,15 @@ class Session:
         rig: Rig,
         performer: Performer | None = None,
         layout: Layout | None = None,
-        jaw_mode: JawMode | None = None,
+        how: SolveSettings | None = None,
         updates: Callable[[], Performer | None] = lambda: None,
     ) -> None:
         """`layout` is found from the first frame's names where neither it nor a performer tells it.
 
-        `jaw_mode` overrides how the performer's jaw is read. `updates` is asked before every frame for a performer that
-        was edited meanwhile.
+        `updates` is asked before every frame for a performer that was edited meanwhile.
         """
         self._rig = rig
-        self._jaw_mode = jaw_mode
+        self._how = how or SolveSettings()
         self._updates = updates
         self._layout = layout or (load_layout(performer.layout) if performer else None)
         self._labeller: Labeller | None = None
@@ -105,7 +116,7 @@ class Session:
         performer, T_world_head = performer_from_neutral(layout, neutral.positions, self._rig, noise=neutral.spread_m)
         log.info("Neutral found in frames %d to %d.", neutral.first_number, neutral.last_number)
         self.performer = self._as_asked(performer)
-        return _Solver(self._rig, layout, self.performer, T_world_head)
+        return _Solver(self._rig, layout, self.performer, T_world_head, self._how)
 
     def _from_performer(self, labelled: MarkerFrame, performer: Performer) -> _Solver | None:
         """The first frame that shows the head says which way it looks when it looks straight ahead."""
@@ -115,7 +126,7 @@ class Session:
         if not np.isfinite(stabilised.positions).any() or stabilised.T_world_head is None:
             return None
         self.performer = self._as_asked(performer)
-        return _Solver(self._rig, layout, self.performer, stabilised.T_world_head)
+        return _Solver(self._rig, layout, self.performer, stabilised.T_world_head, self._how)
 
     def _adopt(self, performer: Performer) -> None:
         """Go on with another calibration from the next frame; if it does not fit, say so and keep the old one."""
@@ -130,9 +141,9 @@ class Session:
         log.warning("The performer %s was read again.", performer.name)
 
     def _as_asked(self, performer: Performer) -> Performer:
-        if self._jaw_mode is None or performer.jaw is None:
+        if self._how.jaw is None or performer.jaw is None:
             return performer
-        return replace(performer, jaw=replace(performer.jaw, mode=self._jaw_mode))
+        return replace(performer, jaw=replace(performer.jaw, mode=self._how.jaw))
 
     def _solve_waiting(self) -> list[Pose]:
         frames = [*self._waiting]
@@ -143,23 +154,29 @@ class Session:
 class _Solver:
     """The stages that need to know the neutral."""
 
-    def __init__(self, rig: Rig, layout: MarkerLayout, performer: Performer, T_world_reference: Array) -> None:
+    def __init__(
+        self, rig: Rig, layout: MarkerLayout, performer: Performer, T_world_reference: Array, how: SolveSettings
+    ) -> None:
         self._neutral = neutral_in(layout, performer)
-        self._for_performer = partial(JointMapping, rig, layout, T_world_reference=T_world_reference)
-        self._afresh = partial(_Solver, rig, layout, T_world_reference=T_world_reference)
+        self._for_performer = partial(
+            Drive, rig, layout, T_world_reference=T_world_reference, mode=how.drive, smooth=how.smooth
+        )
+        self._afresh = partial(_Solver, rig, layout, T_world_reference=T_world_reference, how=how)
         self._stabilise = Stabiliser(self._neutral[list(layout.head)], layout.head)
         self._fill = Filler(self._neutral)
-        self._solve = self._for_performer(performer)
+        self._drive = self._for_performer(performer)
         self._layout = layout
 
     def __call__(self, frame: MarkerFrame) -> Pose:
-        return self._solve(self._fill(self._stabilise(frame)))
+        stabilised = self._stabilise(frame)
+        seen = np.isfinite(stabilised.positions.sum(axis=1))
+        return self._drive(self._fill(stabilised), seen)
 
     def with_performer(self, performer: Performer) -> _Solver:
         """The same with another calibration; what it remembers of the frames stays if the neutral does."""
         if not np.array_equal(neutral_in(self._layout, performer), self._neutral, equal_nan=True):
             return self._afresh(performer)
-        self._solve = self._for_performer(performer)
+        self._drive = self._for_performer(performer)
         return self
 
 

@@ -14,6 +14,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
+from retarget.camera.pictures import FILM_ENDINGS
 from retarget.errors import InputError
 
 if TYPE_CHECKING:
@@ -237,13 +238,13 @@ class Paced:
 def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> Source:
     """The source for a file or an address, not yet opened; `tap` is given every datagram of a live one.
 
-    InputError where no source takes `where`, and for a `tap` on what is no live stream.
+    InputError where no source takes `where`, and for a `tap` on what sends no datagrams.
     """
-    name = where.split("://", 1)[0] if "://" in where else Path(where).suffix.lower()
+    name = _kind(where)
     if name in SCHEMES:
         return SCHEMES[name](where, tap)
     if tap is not None:
-        raise InputError(f"{where} is no live stream; only one of {', '.join(_addresses())} can be recorded.")
+        raise InputError(f"{where} sends no datagrams; only {', '.join(_addresses())} can be recorded.")
     if name in ENDINGS:
         return ENDINGS[name](where)
     for entry in entry_points(group="retarget.sources", name=name):
@@ -257,7 +258,22 @@ def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> So
 def known_sources() -> list[str]:
     """What a source can be, for people to read."""
     others = sorted(entry.name for entry in entry_points(group="retarget.sources"))
-    return [*_addresses(), *(f"*{ending}" for ending in ENDINGS), *others]
+    endings = [f"*{ending}" for ending in ENDINGS if ending.startswith(".")]
+    return [*_addresses(), CAMERA, "a folder of pictures", *endings, *others]
+
+
+def are_landmarks(where: str) -> bool:
+    """Whether the points of this source are found in pictures, which is noisier than markers are."""
+    return _kind(where) in {"udp", "camera", "folder", *FILM_ENDINGS}
+
+
+def _kind(where: str) -> str:
+    """A scheme, ``camera``, ``folder``, or the ending of a file's name."""
+    if "://" in where:
+        return where.split("://", 1)[0]
+    if where.startswith("camera:"):
+        return "camera"
+    return "folder" if Path(where).is_dir() else Path(where).suffix.lower()
 
 
 def _addresses() -> list[str]:
@@ -282,8 +298,25 @@ def _natnet(where: str, tap: Callable[[Datagram], None] | None) -> Source:
     return NatNetMarkers(NatNetSource(where, tap=tap))
 
 
-SCHEMES: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {"natnet": _natnet}
+def _landmarks(where: str, tap: Callable[[Datagram], None] | None) -> Source:
+    from retarget.udp.landmark_source import LandmarkSource
+
+    return LandmarkSource(where, tap=tap)
+
+
+def _camera(where: str) -> Source:
+    from retarget.camera.source import CameraSource
+
+    return CameraSource(where)
+
+
+CAMERA = "camera:0"
+SCHEMES: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {
+    "natnet": _natnet,
+    "udp": _landmarks,
+}
 ENDINGS: dict[str, Callable[[str], Source]] = {
     **dict.fromkeys((".mcap", ".pcapng", ".pcap"), _take),
     **dict.fromkeys((".c3d", ".trc", ".csv"), _clip),
+    **dict.fromkeys(("camera", "folder", *FILM_ENDINGS), _camera),
 }

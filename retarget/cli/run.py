@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from retarget.pipeline import Run, RunReport
     from retarget.rig.display.view import View
     from retarget.rig.display.window import Window
+    from retarget.rig.pose_smoother import Smoothing
+    from retarget.session import Session
     from retarget.sinks import SinkSettings
     from retarget.sources import Source
     from retarget.take.recorder import TakeRecorder
@@ -67,7 +69,7 @@ def perform(where: str, targets: tuple[str, ...], seconds: float | None, options
     from retarget.sources import Paced, open_source
 
     files = tuple(target for target in targets if target != WINDOW)
-    session = _session(options)
+    session = _session(where, options)
     open_source(where, (lambda _: None) if options["record"] else None)  # what cannot be is told before a take is made
     with ExitStack() as stack:
         opened = open_source(where, stack.enter_context(_recorder(where, options)) if options["record"] else None)
@@ -104,17 +106,20 @@ def _recorder(where: str, options: dict[str, Any]) -> TakeRecorder:
     return TakeRecorder(Path(options["record"]), about)
 
 
-def _session(options: dict[str, Any]) -> Any:
+def _session(where: str, options: dict[str, Any]) -> Session:
     from retarget.markers.layouts import load_layout
     from retarget.performer import load_performer
     from retarget.performer_watch import PerformerWatch
     from retarget.rig.load import load_rig
-    from retarget.session import Session
+    from retarget.session import Session, SolveSettings
+    from retarget.sources import are_landmarks
 
     layout = load_layout(options["layout"]) if options["layout"] else None
     performer = load_performer(options["performer"]) if options["performer"] else None
     updates = PerformerWatch(Path(options["performer"])) if performer else lambda: None
-    return Session(load_rig(options["rig"]), performer, layout, options["jaw"], updates)
+    smooth: Smoothing = options["smooth"] or ("one-euro" if are_landmarks(where) else "none")
+    how = SolveSettings(options["drive"], smooth, options["jaw"])
+    return Session(load_rig(options["rig"]), performer, layout, how, updates)
 
 
 def _settings(source: Source, options: dict[str, Any]) -> SinkSettings:
