@@ -41,6 +41,8 @@ OPENVHEAD_MODEL: Array = np.array(
 """(6, 3) the same in the model's arbitrary unit of about 0.1 mm, +Y up, +Z out of the face."""
 LEAST_POINTS = 4
 """Points that a pose needs."""
+DOUBTFUL = 0.05
+"""Error over the size of the face in the picture from which a followed pose is searched anew: the head has jumped."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,30 +113,46 @@ class HeadPoseTracker:
             self.reset()
             return None
         model, pixels = self._model[seen], np.ascontiguousarray(points[seen], float)
-        found = self._solve(model, pixels)
-        if found is None:
+        pose = self._best(model, pixels)
+        if pose is None:
             self.reset()
-            return None
-        self._last = found
-        return self._pose(model, pixels, *found)
+        return pose
 
-    def _solve(self, model: Array, pixels: Array) -> tuple[Array, Array] | None:
+    def _best(self, model: Array, pixels: Array) -> HeadPose | None:
+        """Followed from the last pose where that fits, else from a search without any guess."""
+        followed = self._refined(model, pixels, self._last) if self._last is not None else None
+        doubtful_px = DOUBTFUL * float(np.ptp(pixels, axis=0).max())
+        if followed is None or followed[2] > doubtful_px:
+            searched = self._refined(model, pixels, None)
+            found = [each for each in (followed, searched) if each is not None]
+            if not found:
+                return None
+            followed = min(found, key=lambda each: each[2])
+        turn, place, error_px = followed
+        self._last = turn, place
+        return self._pose(turn, place, error_px)
+
+    def _refined(
+        self, model: Array, pixels: Array, start: tuple[Array, Array] | None
+    ) -> tuple[Array, Array, float] | None:
+        """Rotation vector and translation, (3, 1) each, and the error [px], by least squares from `start`."""
         import cv2
 
         try:
-            start = self._last or _first(model, pixels, self._camera)
-            found, turn, place = cv2.solvePnP(
-                model, pixels, self._camera, None, start[0].copy(), start[1].copy(), True, cv2.SOLVEPNP_ITERATIVE
+            turn, place = _searched(model, pixels, self._camera) if start is None else start
+            found, turn, place = cv2.solvePnP(  # type: ignore[assignment]
+                model, pixels, self._camera, None, turn.copy(), place.copy(), True, cv2.SOLVEPNP_ITERATIVE
             )
+            shown, _ = cv2.projectPoints(model, turn, place, self._camera, None)
         except cv2.error:  # points on one line, or all at one place
             return None
-        return (np.asarray(turn, float), np.asarray(place, float)) if found and place[2, 0] > 0 else None
+        error_px = float(np.sqrt(((shown[:, 0] - pixels) ** 2).sum(axis=1).mean()))
+        in_front = place[2, 0] > 0 and np.isfinite(error_px)
+        return (np.asarray(turn, float), np.asarray(place, float), error_px) if found and in_front else None
 
-    def _pose(self, model: Array, pixels: Array, turn: Array, place: Array) -> HeadPose:
+    def _pose(self, turn: Array, place: Array, error_px: float) -> HeadPose:
         import cv2
 
-        shown, _ = cv2.projectPoints(model, turn, place, self._camera, None)
-        error_px = float(np.sqrt(((shown[:, 0] - pixels) ** 2).sum(axis=1).mean()))
         rotation, _ = cv2.Rodrigues(turn)
         T_camera_head = geometry.transform(CV_TO_HOUSE @ rotation, CV_TO_HOUSE @ place[:, 0])
         quat = geometry.quat_from_matrix(T_camera_head[:3, :3])
@@ -142,7 +160,7 @@ class HeadPoseTracker:
         return HeadPose(T_camera_head, self._quat, error_px)
 
 
-def _first(model: Array, pixels: Array, camera: Array) -> tuple[Array, Array]:
+def _searched(model: Array, pixels: Array, camera: Array) -> tuple[Array, Array]:
     """Rotation vector and translation, (3, 1) each, without any guess."""
     import cv2
 

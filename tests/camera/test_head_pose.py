@@ -80,6 +80,15 @@ def test_too_few_points_or_points_in_one_place_give_no_pose() -> None:
     assert track(pixels) is not None
 
 
+@pytest.mark.parametrize("angles", [(0.0, 0.0, 3.1), (0.3, -1.2, -2.0), (-0.9, 1.2, 1.5)])
+def test_a_head_that_jumps_is_found_again_at_once(angles: tuple[float, float, float]) -> None:
+    track = HeadPoseTracker(face(), SIZE)
+    track(seen(face(), turned(0.0, 0.0)))
+    pose = track(seen(face(), turned(*angles)))
+    assert pose is not None
+    np.testing.assert_allclose(pose.T_camera_head, turned(*angles), atol=1e-4)
+
+
 def test_after_a_reset_the_answer_does_not_depend_on_what_was_before() -> None:
     pixels = seen(face(), turned(0.2, 0.3))
     fresh, used = HeadPoseTracker(face(), SIZE), HeadPoseTracker(face(), SIZE)
