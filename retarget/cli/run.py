@@ -38,6 +38,8 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv; may be given several times.  
 @click.option("--layout", help="Name of a layout, or the path of its TOML file.  [the one whose names fit best]")
 @click.option("--record", type=click.Path(), metavar="TAKE", help="Also record a live source, to a new .mcap file.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long.")
+@click.option("--drive", type=click.Choice(["joints", "shapes", "both"]), default="joints", show_default=True)
+@click.option("--smooth", type=click.Choice(["none", "one-euro", "pd"]), help="[one-euro for a camera, else none]")
 @click.option(
     "--jaw", type=click.Choice(["signed", "cosine"]), help="How the jaw's angle is read.  [as the performer's]"
 )
@@ -53,8 +55,8 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv; may be given several times.  
 def command(source: str, to: tuple[str, ...], seconds: float | None, *, as_json: bool, **options: Any) -> None:
     """Solve SOURCE for a rig and hand the poses to every SINK.
 
-    SOURCE is natnet://HOST, or a take: a C3D file. Ctrl-C ends the run and completes every file; a second one does not
-    wait for films to catch up.
+    SOURCE is natnet://HOST, udp://:PORT, camera:0, or a file: a take, a capture, markers (C3D, TRC, CSV), a video.
+    Ctrl-C ends the run and completes every file; a second one does not wait for films to catch up.
     """
     report = perform(source, to or ("window",), seconds, options)
     click.echo(json.dumps(report.as_dict(), indent=2) if as_json else summary(report))
