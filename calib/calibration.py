@@ -15,7 +15,8 @@ from calib.axes import refine_axes
 from calib.face import face_sites, site_moves
 from calib.fixed import with_fixed
 from calib.gains import STRENGTH, Gains, site_graph, solve_gains
-from calib.jaw import fit_jaw, jaw_gain, widest
+from calib.jaw import fit_jaw
+from calib.make_performer import HeadTurn, make_performer
 from calib.matching import Motion, find_matches, moves_in
 from calib.material import RangeTake, lay_out
 from calib.pairs import concerned, make_pairs, pairs_of_matches
@@ -25,7 +26,6 @@ from calib.rig_range import RigRange
 from calib.rolling import rolling_mean
 from calib.score import HeldOut, deal, held_out
 from retarget.errors import InputError
-from retarget.performer import Performer, PerformerJaw, gain_matrix
 from retarget.rig.fit import performer_from_neutral
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from calib.pairs import Pairs
     from calib.rig_range import RigExtreme
     from retarget.frames import MarkerLayout
+    from retarget.performer import Performer
     from retarget.rig.model import Rig
 
     Array = NDArray[np.float64]
@@ -82,8 +83,8 @@ class Calibration:
     face: FaceSites
     laid: LaidOut
     """In the performer's ``head``."""
-    R_head_default: Array
-    """(3, 3): takes vectors in the default's head to the performer's."""
+    turn: HeadTurn
+    """From the default's head to the performer's."""
     motion: Motion
     jaw: JawFit | None
     extremes: tuple[RigExtreme, ...]
@@ -134,10 +135,12 @@ def calibrate(
     on_step(STEPS[4])
     rest = default.neutral[face.markers]
     score = held_out(deal(motion, matches, extremes, face.names), graph, default.scale, rest, rig_range.rest)
-    turned = _Turned(R, default.neutral[face.markers].mean(axis=0))
+    turned = HeadTurn(R, default.neutral[face.markers].mean(axis=0))
     seen = _farthest(motion.moves @ R.T, motion.times)
-    performer, wanted = _performer(default, turned, face, gains, jaw, rig_range, matches, settings)
-    performer = replace(performer, ranges=_ranges(face, seen))
+    performer, jaw_wanted = make_performer(default, turned, face, gains, jaw, rig_range, matches, settings.bounds)
+    ranges = {site: seen[:, i] for i, site in enumerate(face.names) if np.isfinite(seen[:, i]).all()}
+    quality = _quality(material, laid, R, jaw, matches, gains, score)
+    performer = replace(performer, ranges=ranges, quality=quality)
     performer = with_fixed(performer, settings.previous) if settings.previous else performer
     return Calibration(
         performer=performer,
@@ -147,7 +150,7 @@ def calibrate(
         material=material,
         face=face,
         laid=replace(laid, positions=turned.points(laid.positions)),
-        R_head_default=R,
+        turn=turned,
         motion=replace(motion, moves=motion.moves @ R.T, whole=motion.whole @ R.T),
         jaw=jaw,
         extremes=extremes,
@@ -156,23 +159,11 @@ def calibrate(
         pairs=pairs.turned(R),
         strength=strength,
         score=score,
-        jaw_wanted=wanted,
+        jaw_wanted=jaw_wanted,
         bounds=settings.bounds,
         seen=seen,
         rig_seen=_extent([extreme.moves for extreme in extremes], len(face.names)),
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Turned:
-    """Points and vectors in the head's new axes; the turn is about the middle of the face, which stays in place."""
-
-    R: Array
-    about: Array
-
-    def points(self, p: Array) -> Array:
-        turned: Array = (p - self.about) @ self.R.T + self.about
-        return turned
 
 
 def _jaw(
@@ -258,54 +249,33 @@ def _extent(moves: Sequence[Array], sites: int) -> Array:
     return np.stack([every.max(axis=0), every.min(axis=0)])
 
 
-def _ranges(face: FaceSites, seen: Array) -> dict[str, Array]:
-    return {site: seen[:, s] for s, site in enumerate(face.names) if np.isfinite(seen[:, s]).all()}
-
-
-def _performer(
-    default: Performer,
-    turned: _Turned,
-    face: FaceSites,
+def _quality(
+    material: Material,
+    laid: LaidOut,
+    R: Array,
+    jaw: JawFit | None,
+    matches: Sequence[Match],
     gains: Gains,
-    jaw: JawFit | None,
-    rig_range: RigRange,
-    matches: Sequence[Match],
-    settings: Settings,
-) -> tuple[Performer, float | None]:
-    """The performer in the new axes, and the jaw's gain before its bounds."""
-    low, high = (bound * default.scale for bound in settings.bounds)
-    K = {site: gain_matrix(_brief(gains.K[:, s].clip(low, high))) for s, site in enumerate(face.names)}
-    fitted, wanted = _performer_jaw(default, turned, jaw, rig_range, matches, settings)
-    return replace(default, neutral=turned.points(default.neutral), K=K, jaw=fitted), wanted
-
-
-def _brief(K: Array) -> Array:
-    """(2, 3), or (3,) where both directions are one."""
-    return K[0] if np.allclose(K[0], K[1], rtol=1e-3) else K
-
-
-def _performer_jaw(
-    default: Performer,
-    turned: _Turned,
-    jaw: JawFit | None,
-    rig_range: RigRange,
-    matches: Sequence[Match],
-    settings: Settings,
-) -> tuple[PerformerJaw | None, float | None]:
-    if jaw is None or default.jaw is None or rig_range.rig.jaw is None:
-        return default.jaw, None
-    fitted = replace(
-        default.jaw,
-        axis=turned.R @ jaw.axis,
-        pivot=turned.points(jaw.pivot),
-        forward_m=jaw.slides.forward_m,
-        left_m=jaw.slides.left_m,
-        right_m=jaw.slides.right_m,
-    )
-    opened = next((m for m in matches if m.name == "jawOpen" and not m.side and m.exercised), None)
-    opening = opened.turn_rad if opened else (jaw.hinge.opening_rad if jaw.hinge else np.nan)
-    if jaw.hinge is None and (opened is None or opening < np.radians(6.0)):
-        return fitted, None
-    gain, wanted = jaw_gain(opening, rig_range.jaw_rad, settings.bounds)
-    limit = widest(gain, jaw.opening_rad, rig_range.rig.jaw.max_rad)
-    return replace(fitted, gain=gain, max_rad=max(limit, rig_range.rig.jaw.min_rad, 0.0)), wanted
+    score: HeldOut | None,
+) -> dict[str, float]:
+    """Numbers by the names in `retarget.performer.QUALITY`."""
+    whole = [match for match in matches if not match.side]
+    made = sum(any(m.exercised for m in matches if m.name == w.name) for w in whole)
+    quality = {
+        "neutral_spread_mm": 1e3 * material.neutral.spread_m,
+        "head_residual_mm": 1e3 * laid.residual_m,
+        "head_axes_deg": float(np.degrees(np.arccos(np.clip((np.trace(R) - 1) / 2, -1, 1)))),
+        "expressions": float(made),
+        "confidence": float(gains.confidence.mean()),
+    }
+    if jaw:
+        quality["jaw_opening_deg"] = float(np.degrees(jaw.opening_rad))
+        quality |= {"jaw_residual_mm": 1e3 * jaw.hinge.residual_m} if jaw.hinge else {}
+    if score:
+        quality |= {
+            "held_out_mm": score.calibrated,
+            "held_out_k1_mm": score.one,
+            "held_out_scale_mm": score.scale,
+            "held_out_warp_mm": score.warp,
+        }
+    return quality

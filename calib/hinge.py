@@ -97,8 +97,8 @@ def fit_hinge(rest: Array, path: Array, rate_hz: float, axis: Array, pivot: Arra
         raise _hardly_opened(opening)
     if fit.path_sd_m[0] > UNCERTAIN_M:
         raise HingeNotObservableError(
-            f"The hinge of the jaw is not observable: the chin's path leaves it open by {1e3 * fit.path_sd_m[0]:.0f} mm; "
-            "open and close a few times, wide and slowly. The rig's hinge is kept."
+            f"The hinge of the jaw is not observable: the chin's path leaves it open by {1e3 * fit.path_sd_m[0]:.0f} "
+            "mm, so open and close a few times, wide and slowly; the rig's hinge is kept."
         )
     off = np.linalg.norm(model.misfit(fit.parameters), axis=2)
     return Hinge(
