@@ -10,13 +10,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from retarget.camera.landmarks import MESH478
+from retarget.camera.metric import pixels_of
 from retarget.camera.models import model_path
 from retarget.camera.net import Net
+from retarget.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from retarget.camera.landmarks import Landmarks
+    from retarget.frames import MarkerFrame
+
+    Array = NDArray[np.float64]
+
+VIRTUAL_SIZE = (640, 480)
+"""Of the picture through which the net looks at points in metres [px]."""
 
 _SIDED = {
     "browDown", "browOuterUp", "cheekSquint", "eyeBlink", "eyeLookDown", "eyeLookIn", "eyeLookOut", "eyeLookUp",
@@ -50,12 +59,20 @@ class BlendshapeNet:
         """InputError where the model face_blendshapes is not on this machine."""
         self._net = Net(model_path("face_blendshapes"), ("StatefulPartitionedCall:0",))
 
-    def __call__(self, landmarks: Landmarks | None) -> NDArray[np.float64]:
+    def __call__(self, landmarks: Landmarks | None) -> Array:
         """(51,) in [0, 1]; NaN without a face, or where the mesh has no irises."""
-        if landmarks is None or len(landmarks.points) <= _POINTS[-1]:
+        return self._weights(None if landmarks is None else landmarks.points[:, :2])
+
+    def of_frame(self, frame: MarkerFrame) -> Array:
+        """(51,) as above, for a frame of a face mesh in ``camera`` [m], as it comes over the network; the net minds
+        neither the picture's size nor where the face is in it. InputError for other markers.
+        """
+        if frame.layout.names != MESH478.names:
+            raise InputError(f"Weights by MediaPipe's net need {MESH478.name}; the markers are {frame.layout.name}.")
+        return self._weights(pixels_of(frame.positions, VIRTUAL_SIZE))
+
+    def _weights(self, pixels: Array | None) -> Array:
+        if pixels is None or not np.isfinite(pixels[_POINTS]).all():
             return np.full(len(NAMES), np.nan)
-        seen = landmarks.points[_POINTS, :2]
-        if not np.isfinite(seen).all():
-            return np.full(len(NAMES), np.nan)
-        weights = self._net(seen[None].astype(np.float32))[0][1:]  # the first is what is left for a neutral face
+        weights = self._net(pixels[_POINTS][None].astype(np.float32))[0][1:]  # the first is what is left for neutral
         return np.asarray(np.clip(weights.astype(float), 0.0, 1.0))

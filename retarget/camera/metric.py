@@ -47,6 +47,17 @@ def metres_for(layout: MarkerLayout, face: CanonicalFace, size: tuple[int, int],
     return PosedDepth(face, size, focal_px) if layout is IBUG68 else MeshDepth(face, size, focal_px)
 
 
+def pixels_of(positions: Array, size: tuple[int, int], focal_px: float | None = None) -> Array:
+    """(M, 2) [px] where points (M, 3) [m], `camera`, are in a picture of `size` (width, height) [px]; NaN stays NaN.
+
+    Points behind the camera are NaN; `focal_px` None is the width.
+    """
+    focal = float(size[0]) if focal_px is None else focal_px
+    away = np.where(positions[:, 2:] < 0, -positions[:, 2:], np.nan)
+    seen: Array = np.array(size) / 2 + positions[:, :2] * [focal, -focal] / away
+    return seen
+
+
 class MeshDepth:
     """For a mesh with depth of its own, drawn as if from afar: find the distance, then undo the perspective."""
 

@@ -16,6 +16,7 @@ from retarget.camera import ibug68
 from retarget.camera.head_pose import CV_TO_HOUSE, OPENVHEAD_MODEL, OPENVHEAD_POINTS, HeadPoseTracker
 from retarget.camera.landmarks import IBUG68, MESH478
 from retarget.camera.measures import OpenVHeadMeasures, openvhead_measures, reference_length
+from retarget.camera.metric import pixels_of
 from retarget.camera.openvhead import DECIMALS, OpenVHeadChain, OpenVHeadValues
 from retarget.errors import InputError
 from retarget.filters import OneEuro
@@ -58,9 +59,9 @@ class OpenVHeadFeed:
         if frame.layout is not self._layout:
             self._learn(frame.layout)
         positions = ibug68.from_mesh(frame.positions) if self._from_mesh else frame.positions
-        if not np.isfinite(positions).all() or not (positions[:, 2] < 0).all():
+        points = pixels_of(positions, SIZE)
+        if not np.isfinite(points).all():
             return None
-        points = np.array(SIZE) / 2 + positions[:, :2] * [SIZE[0], -SIZE[0]] / -positions[:, 2:]
         if isinstance(self._chain, _SteadyChain):
             return self._chain(points, frame.time_s)
         return self._chain(np.rint(points))

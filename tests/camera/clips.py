@@ -14,7 +14,7 @@ CARPHONE = models.read_card(Path(__file__).with_name("carphone.toml"))
 def carphone() -> Path:
     """The clip; skips the test where nobody has fetched it."""
     if models.state(CARPHONE) != "ready":
-        pytest.skip("the clip carphone is not here; `make demo-camera` fetches it")
+        pytest.skip("the clip carphone is not here; fetch it with `python -m tests.camera.fetch`")
     return CARPHONE.path
 
 
@@ -22,4 +22,4 @@ def need(*names: str) -> None:
     """Skip the test where one of the models is not here."""
     for card, state in models.available():
         if card.name in names and state != "ready":
-            pytest.skip(f"the model {card.name} is not here; fetch it with `retarget models --fetch {card.name}`")
+            pytest.skip(f"the model {card.name} is not here; fetch it with `python -m tests.camera.fetch`")

@@ -6,11 +6,16 @@ from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
+import pytest
 
 from retarget.camera.blendshape_net import NAMES, BlendshapeNet
+from retarget.camera.canonical import load_canonical_face
 from retarget.camera.face_mesh import FaceMesh
 from retarget.camera.files import FilmPictures
-from retarget.camera.landmarks import MESH478, Landmarks
+from retarget.camera.landmarks import IBUG68, MESH478, Landmarks
+from retarget.camera.metric import MeshDepth
+from retarget.errors import InputError
+from retarget.frames import MarkerFrame
 from tests.camera import clips, oracles
 
 if TYPE_CHECKING:
@@ -67,6 +72,18 @@ def test_the_weights_for_mediapipes_own_points_are_its_own() -> None:
     points = oracle["landmarks478_px"].astype(float)[::EVERY]
     weights = np.array([net(Landmarks(MESH478, each, 1.0)) for each in points])
     np.testing.assert_allclose(weights, oracle["blendshapes"][::EVERY, 1:], atol=1e-4)
+
+
+def test_weights_come_as_well_from_metres_that_went_over_the_network() -> None:
+    points = oracles.mediapipe()["landmarks478_px"].astype(float)[::EVERY]
+    clips.need("face_blendshapes", "face_geometry")
+    net, metres = BlendshapeNet(), MeshDepth(load_canonical_face(), (176, 144))
+    for each in points:
+        landmarks = Landmarks(MESH478, each, 1.0)
+        frame = MarkerFrame(0, 0.0, 0.0, MESH478, metres(landmarks))
+        np.testing.assert_allclose(net.of_frame(frame), net(landmarks), atol=1e-3)
+    with pytest.raises(InputError, match="need mediapipe478"):
+        net.of_frame(MarkerFrame(0, 0.0, 0.0, IBUG68, np.zeros((68, 3))))
 
 
 def test_without_a_face_or_without_irises_there_are_no_weights() -> None:
