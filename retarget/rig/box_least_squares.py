@@ -1,11 +1,11 @@
 """Least squares with every unknown between 0 and 1, exact and fast for the same matrix again and again.
 
-Minimises |A w - b|^2 + alpha |w - w_before|^2 + beta sum(w), 0 <= w <= 1: linear equations on the free unknowns once it
-is known which are at 0 and at 1. These are found by block principal pivoting: all unknowns on the wrong side change
-sides at once (Judice and Pires, "A block principal pivoting algorithm for large-scale strictly monotone linear
-complementarity problems", Computers & OR 21(5), 1994); where that goes round in circles an active-set descent, one
-unknown at a time, ends it. Starting from the sides of the last frame it takes one or two rounds. AᵀA is formed once for
-every set of rows.
+Minimises |A w - b|^2 + alpha |w - w_before|^2 + beta sum(|A_i| w_i), 0 <= w <= 1, A_i the columns: linear equations on
+the free unknowns once it is known which are at 0 and at 1. These are found by block principal pivoting: all unknowns on
+the wrong side change sides at once (Judice and Pires, "A block principal pivoting algorithm for large-scale strictly
+monotone linear complementarity problems", Computers & OR 21(5), 1994); where that goes round in circles an active-set
+descent, one unknown at a time, ends it. Starting from the sides of the last frame it takes one or two rounds. AᵀA is
+formed once for every set of rows.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class BoxLeastSquares:
     """Solves for one matrix; keeps which unknowns were at a bound, as a guess for the next call, and nothing else."""
 
     def __init__(self, A: Array, smoothness: float = 0.0, sparsity: float = 0.0) -> None:
-        """`A` (R, N); alpha is `smoothness` and beta `sparsity`, both 0 or more, in the unit of |A w|^2."""
+        """`A` (R, N); alpha is `smoothness` and beta `sparsity`, both 0 or more, in the units of |A w|^2 and |A w|."""
         self._A = np.asarray(A, float)
         self._smoothness, self._sparsity = smoothness, sparsity
         self._rows: Mask | None = None
@@ -60,7 +60,7 @@ class BoxLeastSquares:
         alpha = 0.0 if before is None else self._smoothness if smoothness is None else smoothness
         H = self._gram.copy()
         H.flat[:: len(H) + 1] += alpha
-        f = self._seen_A.T @ b[seen] - self._sparsity / 2
+        f = self._seen_A.T @ b[seen] - self._cost / 2
         if before is not None:
             f += alpha * before
         w, self._sides, self.rounds = box_minimum(H, f, self._sides)
@@ -70,6 +70,7 @@ class BoxLeastSquares:
         """Take only these rows of A from now on."""
         self._rows, self._seen_A = rows, np.ascontiguousarray(self._A[rows])
         self._gram = self._seen_A.T @ self._seen_A
+        self._cost = self._sparsity * np.sqrt(np.einsum("ri,ri->i", self._seen_A, self._seen_A))
         self._gram.flat[:: len(self._gram) + 1] += max(RIDGE * float(np.trace(self._gram)) / len(self._gram), 1e-30)
 
 

@@ -102,7 +102,7 @@ class _ShapeDrive:
 
     def __init__(self, rig: Rig, layout: MarkerLayout, sites: tuple[str, ...], mode: DriveMode) -> None:
         self._sites = _SiteJoints.of(rig, sites)
-        self._markers = [np.array([site == name for site in layout.sites], bool) for name in sites]
+        self._markers = np.array([[site == name for site in layout.sites] for name in sites])
         self._joints_take_the_rest = mode == "both"
         jaw_turns = mode == "both" or JAW_OPEN not in rig.shape_names
         self._idle_jaw = None if rig.jaw is None or jaw_turns else rig.jaw.joint
@@ -118,7 +118,7 @@ class _ShapeDrive:
         if self._idle_jaw is not None:
             target = self._sites.with_jaw(moves, pose)
             rotations[self._idle_jaw] = self._sites.rig.joints.rotations[self._idle_jaw]
-        missing = np.array([not (markers & seen).any() for markers in self._markers])
+        missing = ~(self._markers & seen).any(axis=1)
         weights = self.solver(np.where(missing[:, None], np.nan, target), pose.time_s)
         left = moves - self._displacements @ weights if self._joints_take_the_rest else np.zeros_like(moves)
         return replace(pose, translations=self._sites.moved(left), rotations=rotations, weights=weights)

@@ -191,6 +191,11 @@ class Responses:
         """Names of the measures that are asked for."""
         self.reset()
 
+    def measures_of(self, *curves: type[object]) -> tuple[str, ...]:
+        """Names of the measures that a curve of one of these types is for."""
+        found = (response.measure for _, response in self._driven if isinstance(response.curve, curves))
+        return tuple(dict.fromkeys(found))
+
     def reset(self) -> None:
         """Forget the last weights: all are 0."""
         self._weights = np.zeros(self._count)

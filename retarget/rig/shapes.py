@@ -1,9 +1,11 @@
 """Weights of a rig's blend shapes from how far its sites have moved.
 
-Minimises |(B w - d) / sigma|^2 + alpha |w - w_before|^2 + beta sum(w), 0 <= w <= 1: d the displacements of the sites
-[m], ``head``, B what the shapes make of them, sigma the noise of a marker. Sites that are not seen drop out. The pull
-to the weights before is that of a value that wanders, so it weakens with the time between the frames; the sum favours
-few shapes over many that cancel out. J. P. Lewis, K. Anjyo, "Direct manipulation blendshapes", IEEE CG&A 30(4), 2010.
+Minimises |(B w - d) / sigma|^2 + alpha |w - w_before|^2 + beta sum(|B_i / sigma| w_i), 0 <= w <= 1: d the displacements
+of the sites [m], ``head``, B what the shapes make of them, B_i one shape's, sigma the noise of a marker. Sites that are
+not seen drop out. The pull to the weights before is that of a value that wanders, so it weakens with the time between
+the frames; the sum, of how far each shape moves the face, favours few shapes over many that cancel out. What the sites
+seen do not show of a shape eases to rest. After J. P. Lewis, K. Anjyo, "Direct manipulation blendshapes", IEEE CG&A
+30(4), 2010.
 
 What no marker sees, or what the other shapes together imitate but for `DISTINCT_M`, is not to be told from noise; such
 shapes stay at 0.
@@ -30,10 +32,12 @@ if TYPE_CHECKING:
 NOISE_M = 0.0003
 DISTINCT_M = 0.0015
 """Five times the noise."""
-SMOOTHNESS = 100.0
-"""Alpha at 60 frames a second: from one to the next a weight changes by about a tenth."""
-SPARSITY = 10.0
-"""Beta: a shape alone that moves the markers by 5 mm in all is shown 2 % too weak."""
+SMOOTHNESS = 200.0
+"""Alpha at 60 frames a second: from one to the next a weight changes by some 0.07."""
+SPARSITY = 0.7
+"""Beta: a shape alone comes out too weak by what moves the markers, all taken together, by a third of the noise."""
+EASE_S = 0.25
+"""Time constant with which a shape that no marker shows goes to 0."""
 RATE_HZ = 60.0
 
 
@@ -61,14 +65,15 @@ class ShapeSolver:
                 f"The sites {', '.join(shapes.sites)} show none of the rig's blend shapes apart from the others: drive "
                 "the joints, or use a layout with more markers."
             )
-        self._solve = BoxLeastSquares(B[:, self._driven] / NOISE_M, sparsity=sparsity)
+        self._B = shapes.displacements[:, :, self._driven]
+        self._solve = BoxLeastSquares(self._B.reshape(B.shape[0], -1) / NOISE_M, sparsity=sparsity)
         self._smoothness, self._count = smoothness, len(shapes.shape_names)
         self.reset()
 
     def reset(self) -> None:
         """Forget the last frame."""
         self._solve.reset()
-        self._weights: Array | None = None
+        self._weights = np.zeros(len(self._driven))
         self._time_s = -np.inf
 
     def __call__(self, displacements: Array, time_s: float) -> Array:
@@ -76,13 +81,25 @@ class ShapeSolver:
 
         A frame that is no later than the one before, a doubled one, gives its weights again.
         """
-        weights = np.zeros(self._count)
-        if time_s > self._time_s:
-            smoothness = self._smoothness / (RATE_HZ * (time_s - self._time_s))
-            self._weights = self._solve(displacements.ravel() / NOISE_M, self._weights, smoothness)
+        step = time_s - self._time_s
+        if step > 0:
+            smoothness = self._smoothness / (RATE_HZ * step)
+            before = self._weights * self._faded(displacements, step)
+            self._weights = self._solve(displacements.ravel() / NOISE_M, before, smoothness)
             self._time_s = time_s
+        weights = np.zeros(self._count)
         weights[self._driven] = self._weights
         return weights
+
+    def _faded(self, displacements: Array, step: float) -> Array:
+        """(N,) what is left of the weights after `step` seconds, as far as the sites seen do not show them."""
+        missing = np.isnan(displacements.sum(axis=1))
+        if not missing.any() or not np.isfinite(step):
+            return np.ones(len(self._driven))
+        squares = np.einsum("scb,scb->sb", self._B, self._B)
+        hidden = squares[missing].sum(axis=0) / squares.sum(axis=0)
+        faded: Array = np.exp(-step / EASE_S * hidden)
+        return faded
 
 
 def distinct_shapes(B: Array, allowed: Collection[int]) -> list[int]:
