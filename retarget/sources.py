@@ -18,7 +18,7 @@ from retarget.camera.pictures import FILM_ENDINGS
 from retarget.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
     from types import TracebackType
 
     from retarget.frames import MarkerFrame
@@ -238,15 +238,15 @@ class Paced:
 def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> Source:
     """The source for a file or an address, not yet opened; `tap` is given every datagram of a live one.
 
-    InputError where no source takes `where`, and for a `tap` on what sends no datagrams.
+    InputError where no source takes `where`, and for a `tap` on what cannot be recorded.
     """
     name = _kind(where)
-    if name in SCHEMES:
-        return SCHEMES[name](where, tap)
+    if name in RECORDABLE:
+        return RECORDABLE[name](where, tap)
     if tap is not None:
-        raise InputError(f"{where} sends no datagrams; only {', '.join(_addresses())} can be recorded.")
-    if name in ENDINGS:
-        return ENDINGS[name](where)
+        raise InputError(f"{where} cannot be recorded; only a stream from {', '.join(_addresses(RECORDABLE))} can.")
+    if name in OTHERS:
+        return OTHERS[name](where)
     for entry in entry_points(group="retarget.sources", name=name):
         source: Source = entry.load()(where)
         return source
@@ -258,8 +258,8 @@ def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> So
 def known_sources() -> list[str]:
     """What a source can be, for people to read."""
     others = sorted(entry.name for entry in entry_points(group="retarget.sources"))
-    endings = [f"*{ending}" for ending in ENDINGS if ending.startswith(".")]
-    return [*_addresses(), CAMERA, "a folder of pictures", *endings, *others]
+    endings = [f"*{ending}" for ending in OTHERS if ending.startswith(".")]
+    return [*_addresses(RECORDABLE), "udp://:PORT", "camera:0", "a folder of pictures", *endings, *others]
 
 
 def are_landmarks(where: str) -> bool:
@@ -276,8 +276,8 @@ def _kind(where: str) -> str:
     return "folder" if Path(where).is_dir() else Path(where).suffix.lower()
 
 
-def _addresses() -> list[str]:
-    return [f"{scheme}://HOST" for scheme in SCHEMES]
+def _addresses(schemes: Iterable[str]) -> list[str]:
+    return [f"{scheme}://HOST" for scheme in schemes]
 
 
 def _clip(where: str) -> Source:
@@ -298,10 +298,10 @@ def _natnet(where: str, tap: Callable[[Datagram], None] | None) -> Source:
     return NatNetMarkers(NatNetSource(where, tap=tap))
 
 
-def _landmarks(where: str, tap: Callable[[Datagram], None] | None) -> Source:
+def _landmarks(where: str) -> Source:
     from retarget.udp.landmark_source import LandmarkSource
 
-    return LandmarkSource(where, tap=tap)
+    return LandmarkSource(where)
 
 
 def _camera(where: str) -> Source:
@@ -310,12 +310,9 @@ def _camera(where: str) -> Source:
     return CameraSource(where)
 
 
-CAMERA = "camera:0"
-SCHEMES: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {
-    "natnet": _natnet,
+RECORDABLE: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {"natnet": _natnet}
+OTHERS: dict[str, Callable[[str], Source]] = {
     "udp": _landmarks,
-}
-ENDINGS: dict[str, Callable[[str], Source]] = {
     **dict.fromkeys((".mcap", ".pcapng", ".pcap"), _take),
     **dict.fromkeys((".c3d", ".trc", ".csv"), _clip),
     **dict.fromkeys(("camera", "folder", *FILM_ENDINGS), _camera),

@@ -40,7 +40,7 @@ def test_a_file_that_is_no_c3d_is_refused(tmp_path: Path) -> None:
 
 def test_a_source_of_unknown_kind_lists_the_known_ones(tmp_path: Path) -> None:
     (tmp_path / "take.xyz").touch()
-    assert "natnet://HOST, *.mcap, *.pcapng, *.pcap, *.c3d" in sentence(retarget("run", str(tmp_path / "take.xyz")))
+    assert "natnet://HOST, udp://:PORT, camera:0" in sentence(retarget("run", str(tmp_path / "take.xyz")))
 
 
 def test_a_sink_of_unknown_kind_lists_the_known_ones() -> None:

@@ -110,7 +110,7 @@ def test_a_take_is_never_overwritten(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("record", TAKE, "out.mcap"), "no live stream"),
+        (("record", TAKE, "out.mcap"), "cannot be recorded"),
         (("convert", TAKE, "out.xyz"), "out.xyz"),
         (("convert", "none.c3d", "out.trc"), "none.c3d"),
         (("inspect", "none.mcap"), "none.mcap"),
