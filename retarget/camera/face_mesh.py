@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from retarget.camera import ibug68
 from retarget.camera.face_detector import FaceDetector
-from retarget.camera.landmarks import MESH478, Landmarks
+from retarget.camera.landmarks import IBUG68, MESH478, Landmarks
 from retarget.camera.models import model_path
 from retarget.camera.net import Net, picture_blob, sigmoid
 from retarget.camera.region import Region
@@ -89,3 +90,28 @@ class FaceMesh:
         corners = np.stack([seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)])
         self._region = Region.around(corners, seen[EYE_RIGHT, :2], seen[EYE_LEFT, :2])
         return Landmarks(MESH478, points, confidence)
+
+
+class Mesh68:
+    """A `Detector` of the 68 landmarks of iBUG, read off the mesh; without depth, as other detectors of the 68."""
+
+    def __init__(self, mesh: FaceMesh) -> None:
+        self._mesh = mesh
+
+    @property
+    def layout(self) -> MarkerLayout:
+        """The 68 of iBUG."""
+        return IBUG68
+
+    def reset(self) -> None:
+        """As the mesh."""
+        self._mesh.reset()
+
+    def __call__(self, picture: NDArray[np.uint8]) -> Landmarks | None:
+        """Those in `picture` (H, W, 3) BGR; None where there is no face."""
+        found = self._mesh(picture)
+        if found is None:
+            return None
+        points = ibug68.from_mesh(found.points)
+        points[:, 2] = np.nan
+        return Landmarks(IBUG68, points, found.confidence)

@@ -74,6 +74,20 @@ def test_the_face_follows_the_clip() -> None:
     assert np.corrcoef(shown, seen)[0, 1] > 0.8
 
 
+def test_the_68_landmarks_read_off_the_mesh_open_the_mouth_as_well() -> None:
+    clips.need(*MODELS)
+    with CameraSource(str(clips.carphone()), "mediapipe68") as source:
+        frames = list(source)
+    assert detect_layout(frames[0].layout.names).name == "ibug68"
+    assert all(np.isfinite(frame.positions).all() for frame in frames)
+    jaw = load_rig("human").joints.names.index("jaw")
+    few, many = (
+        np.array([pose.rotations[jaw, 0] for pose in poses(each, Session(load_rig("human")))])
+        for each in (frames, clip_frames())
+    )
+    assert np.corrcoef(few, many)[0, 1] > 0.8
+
+
 class Blinking:
     """A detector that sees a face in some pictures only."""
 
