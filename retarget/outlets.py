@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from retarget.errors import RetargetError
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from contextlib import AbstractContextManager
 
-    from retarget.frames import Pose
+    from retarget.frames import MarkerFrame, Pose
 
 
 class Sink(Protocol):
@@ -27,6 +27,16 @@ class Sink(Protocol):
         """Write, draw or send one pose."""
 
 
+class FrameSink(Protocol):
+    """Takes marker frames as the source gives them, one after the other."""
+
+    def __call__(self, frame: MarkerFrame) -> None:
+        """Send one frame."""
+
+
+Item = TypeVar("Item")
+
+
 class Backlog(Enum):
     """What happens to a pose that finds the queue full."""
 
@@ -34,7 +44,7 @@ class Backlog(Enum):
     DROP_OLDEST = auto()
 
 
-class Outlet:
+class Outlet(Generic[Item]):
     """One sink, opened, fed and closed in a thread of its own (a drawing context belongs to the thread that made it).
 
     `start` returns once the sink is open, or raises what opening raised. An error while writing closes this sink
@@ -42,7 +52,11 @@ class Outlet:
     """
 
     def __init__(
-        self, name: str, opener: Callable[[], AbstractContextManager[Sink]], backlog: Backlog, capacity: int
+        self,
+        name: str,
+        opener: Callable[[], AbstractContextManager[Callable[[Item], None]]],
+        backlog: Backlog,
+        capacity: int,
     ) -> None:
         self.name = name
         self.written = 0
@@ -51,7 +65,7 @@ class Outlet:
         self._opener = opener
         self._backlog = backlog
         self._capacity = capacity
-        self._poses: deque[Pose] = deque()
+        self._items: deque[Item] = deque()
         self._changed = threading.Condition()
         self._settled = threading.Event()
         self._is_open = False
@@ -75,18 +89,18 @@ class Outlet:
     @property
     def waiting(self) -> int:
         """Poses in the queue."""
-        return len(self._poses)
+        return len(self._items)
 
-    def put(self, pose: Pose) -> None:
-        """Hand over one pose."""
+    def put(self, item: Item) -> None:
+        """Hand over one pose, or whatever this sink takes."""
         with self._changed:
             if self._backlog is Backlog.WAIT:
-                self._changed.wait_for(lambda: len(self._poses) < self._capacity or self.error or self._closing)
-            elif len(self._poses) >= self._capacity:
-                self._poses.popleft()
+                self._changed.wait_for(lambda: len(self._items) < self._capacity or self.error or self._closing)
+            elif len(self._items) >= self._capacity:
+                self._items.popleft()
                 self.dropped += 1
             if not (self.error or self._closing):
-                self._poses.append(pose)
+                self._items.append(item)
                 self._changed.notify_all()
 
     def finish(self, *, timeout_s: float | None = None) -> bool:
@@ -100,8 +114,8 @@ class Outlet:
     def abandon(self) -> None:
         """Forget what still waits; `finish` then closes the sink with what it has."""
         with self._changed:
-            self.dropped += len(self._poses)
-            self._poses.clear()
+            self.dropped += len(self._items)
+            self._items.clear()
             self._changed.notify_all()
 
     def _work(self) -> None:
@@ -109,8 +123,8 @@ class Outlet:
             with self._opener() as sink:
                 self._is_open = True
                 self._settled.set()
-                while (pose := self._next()) is not None:
-                    sink(pose)
+                while (item := self._next()) is not None:
+                    sink(item)
                     self.written += 1
         except RetargetError as error:
             self._fail(error)
@@ -120,15 +134,15 @@ class Outlet:
         finally:
             self._settled.set()
 
-    def _next(self) -> Pose | None:
+    def _next(self) -> Item | None:
         with self._changed:
-            self._changed.wait_for(lambda: self._poses or self._closing)
-            pose = self._poses.popleft() if self._poses else None
+            self._changed.wait_for(lambda: self._items or self._closing)
+            item = self._items.popleft() if self._items else None
             self._changed.notify_all()
-            return pose
+            return item
 
     def _fail(self, error: RetargetError) -> None:
         with self._changed:
             self.error = error
-            self._poses.clear()
+            self._items.clear()
             self._changed.notify_all()

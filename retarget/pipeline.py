@@ -9,12 +9,12 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 from retarget.latency import LatencyHistogram
-from retarget.sinks import open_outlet
+from retarget.sinks import open_frame_outlet, open_outlet, takes_frames
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from retarget.frames import Pose
+    from retarget.frames import MarkerFrame, Pose
     from retarget.outlets import Outlet, Sink
     from retarget.session import Session
     from retarget.sinks import SinkSettings
@@ -41,7 +41,7 @@ class RunReport:
     poses: int
     seconds: float
     latency_p50_ms: float | None
-    """From the arrival of a datagram to its pose; None for a file."""
+    """From the arrival of a datagram to its pose; None for a file, and without poses."""
     latency_p99_ms: float | None
     sinks: dict[str, SinkReport]
 
@@ -65,12 +65,14 @@ class Run:
     def __init__(
         self,
         source: Source,
-        session: Session,
+        session: Session | None,
         targets: Sequence[str],
         settings: Callable[[Source], SinkSettings],
         window: Sink | None = None,
     ) -> None:
-        """`settings` is asked once the source is open and knows its rate; `window` is fed directly, since it never
+        """Without a `session` nothing is solved, and only targets that take frames are of use.
+
+        `settings` is asked once the source is open and knows its rate; `window` is fed directly, since it never
         waits.
         """
         self._source = source
@@ -79,7 +81,8 @@ class Run:
         self._settings = settings
         self._window = window
         self._latency = LatencyHistogram()
-        self._outlets: list[Outlet] = []
+        self._poses_to: list[Outlet[Pose]] = []
+        self._frames_to: list[Outlet[MarkerFrame]] = []
         self._stack = ExitStack()
         self._started_s = time.monotonic()
         self.poses = 0
@@ -88,18 +91,29 @@ class Run:
     def __enter__(self) -> Run:
         with ExitStack() as stack:
             stack.enter_context(self._source)
-            settings = self._settings(self._source)
-            for target in self._targets:
-                outlet = open_outlet(target, settings, live=self._source.live or self._window is not None)
+            self._make_outlets()
+            for outlet in self._outlets:
                 outlet.start()
                 stack.callback(outlet.finish)
-                self._outlets.append(outlet)
             if not self._source.live:  # a live stream is running by now, and its frames do not wait for sinks
                 for outlet in self._outlets:
                     outlet.wait_open()
             self._stack = stack.pop_all()
         self._started_s = time.monotonic()
         return self
+
+    def _make_outlets(self) -> None:
+        settings = self._settings(self._source)
+        live = self._source.live or self._window is not None
+        for target in self._targets:
+            if takes_frames(target):
+                self._frames_to.append(open_frame_outlet(target, live=live))
+            else:
+                self._poses_to.append(open_outlet(target, settings, live=live))
+
+    @property
+    def _outlets(self) -> list[Outlet[Pose] | Outlet[MarkerFrame]]:
+        return [*self._poses_to, *self._frames_to]
 
     def __exit__(self, *failure: object) -> None:
         self._stack.close()
@@ -122,23 +136,27 @@ class Run:
     def solve_all(self, on_frame: Callable[[], None] = lambda: None) -> None:
         """Solve the stream to its end and hand the poses out; `on_frame` is called after every frame."""
         for frame in self._source:
-            self._hand_out(self._session(frame))
+            for frames in self._frames_to:
+                frames.put(frame)
+            if self._session is not None:
+                self._hand_out(self._session(frame))
             on_frame()
             for outlet in self._outlets:
                 outlet.check_opening()
             if self._outlets and all(outlet.error for outlet in self._outlets) and self._window is None:
                 break
-        self._hand_out(self._session.finish())
+        if self._session is not None:
+            self._hand_out(self._session.finish())
 
     def report(self) -> RunReport:
         """What was done so far; complete after the end."""
-        live = self._source.live
+        timed = self._source.live and self.poses > 0
         return RunReport(
             source=self._source.counts(),
             poses=self.poses,
             seconds=time.monotonic() - self._started_s,
-            latency_p50_ms=self._latency.percentile_ms(50) if live else None,
-            latency_p99_ms=self._latency.percentile_ms(99) if live else None,
+            latency_p50_ms=self._latency.percentile_ms(50) if timed else None,
+            latency_p99_ms=self._latency.percentile_ms(99) if timed else None,
             sinks={o.name: SinkReport(o.written, o.dropped, str(o.error) if o.error else None) for o in self._outlets},
         )
 
@@ -146,7 +164,7 @@ class Run:
         for pose in poses:
             if len(poses) == 1:  # poses that waited for the neutral tell nothing of the latency
                 self._latency.add(time.monotonic() - pose.received_s)
-            for outlet in self._outlets:
+            for outlet in self._poses_to:
                 outlet.put(pose)
             if self._window is not None:
                 self._window(pose)

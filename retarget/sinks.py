@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from contextlib import AbstractContextManager
 
-    from retarget.frames import Pose
-    from retarget.outlets import Sink
+    from retarget.frames import MarkerFrame, Pose
+    from retarget.outlets import FrameSink, Sink
     from retarget.rig.display.view import View
     from retarget.rig.model import Rig
     from retarget.rig.skinning import Skin, SkinningMethod
@@ -47,18 +47,30 @@ class SinkSettings:
     """Pictures a second of films and picture folders."""
 
 
-def open_outlet(target: str, settings: SinkSettings, *, live: bool) -> Outlet:
+def open_outlet(target: str, settings: SinkSettings, *, live: bool) -> Outlet[Pose]:
     """The outlet for `target`, not yet started; InputError where no sink takes such a target."""
-    opener = _opener(target)
-    if live:
-        return Outlet(target, partial(opener, target, settings), Backlog.DROP_OLDEST, _LIVE_BACKLOG)
-    return Outlet(target, partial(opener, target, settings), Backlog.WAIT, _FILE_BACKLOG)
+    return Outlet(target, partial(_opener(target), target, settings), *_backlog(live=live))
+
+
+def takes_frames(target: str) -> bool:
+    """Whether marker frames go to this target, as the source gives them, and not poses."""
+    return target.split("://", 1)[0] in FRAME_SCHEMES and "://" in target
+
+
+def open_frame_outlet(target: str, *, live: bool) -> Outlet[MarkerFrame]:
+    """The outlet for a target that `takes_frames`, not yet started."""
+    return Outlet(target, partial(FRAME_SCHEMES[target.split("://", 1)[0]], target), *_backlog(live=live))
+
+
+def _backlog(*, live: bool) -> tuple[Backlog, int]:
+    return (Backlog.DROP_OLDEST, _LIVE_BACKLOG) if live else (Backlog.WAIT, _FILE_BACKLOG)
 
 
 def known_targets() -> list[str]:
     """What `--to` takes, for people to read."""
     others = sorted(entry.name for entry in entry_points(group="retarget.sinks"))
-    return [WINDOW, *(f"*{ending}" for ending in ENDINGS), "FOLDER/ (PNG pictures)", *others]
+    streams = [f"{scheme}://HOST:PORT" for scheme in FRAME_SCHEMES]
+    return [WINDOW, *(f"*{ending}" for ending in ENDINGS), "FOLDER/ (PNG pictures)", *streams, *others]
 
 
 def _opener(target: str) -> Opener:
@@ -95,6 +107,30 @@ def _stills(target: str, settings: SinkSettings) -> AbstractContextManager[Sink]
     return ChildSink(draw_stills, target, settings)
 
 
+def _landmarks(target: str) -> AbstractContextManager[FrameSink]:
+    from retarget.udp.landmark_sink import LandmarkSink
+
+    return LandmarkSink(target)
+
+
+@contextmanager
+def _openvhead(target: str) -> Iterator[FrameSink]:
+    from retarget.camera.openvhead_feed import OpenVHeadFeed
+    from retarget.udp.openvhead_message import OpenVHeadMessage
+    from retarget.udp.openvhead_tcp import OpenVHeadClient
+
+    feed = OpenVHeadFeed()
+    with OpenVHeadClient(target) as client:
+
+        def sink(frame: MarkerFrame) -> None:
+            values = feed(frame)
+            if values is not None:
+                client(OpenVHeadMessage(*values.fields()))
+
+        yield sink
+
+
+FRAME_SCHEMES: dict[str, Callable[[str], AbstractContextManager[FrameSink]]] = {"udp": _landmarks, "tcp": _openvhead}
 ENDINGS: dict[str, Opener] = {".csv": _table, ".mp4": _film}
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from retarget.sources import Source
     from retarget.take.recorder import TakeRecorder
 
-SINKS_HELP = "window, out.mp4, frames/, poses.csv; may be given several times.  [window]"
+SINKS_HELP = "window, out.mp4, frames/, poses.csv, udp://HOST:PORT ...; may be given several times.  [window]"
 
 
 @click.command()
@@ -67,15 +67,16 @@ def command(source: str, to: tuple[str, ...], seconds: float | None, *, as_json:
 def perform(where: str, targets: tuple[str, ...], seconds: float | None, options: dict[str, Any]) -> RunReport:
     """Run it all and return what was done."""
     from retarget.pipeline import Run
-    from retarget.sinks import WINDOW
+    from retarget.sinks import WINDOW, takes_frames
     from retarget.sources import Paced, open_source
 
     files = tuple(target for target in targets if target != WINDOW)
-    session = _session(where, options)
+    session = None if all(map(takes_frames, targets)) else _session(where, options)
     open_source(where, (lambda _: None) if options["record"] else None)  # what cannot be is told before a take is made
     with ExitStack() as stack:
         opened = open_source(where, stack.enter_context(_recorder(where, options)) if options["record"] else None)
-        source = Paced(opened) if WINDOW in targets and not opened.live else opened
+        watched = WINDOW in targets or any(map(takes_frames, targets))
+        source = Paced(opened) if watched and not opened.live else opened
         window = stack.enter_context(_window(options)) if WINDOW in targets else None
         run = Run(source, session, files, lambda opened: _settings(opened, options), window)
         stack.enter_context(stopped_by_signals(run.stop, run.abandon))
@@ -88,13 +89,16 @@ def perform(where: str, targets: tuple[str, ...], seconds: float | None, options
 
 def summary(report: RunReport) -> str:
     """The report in a few lines for a person."""
+    from retarget.sinks import takes_frames
+
     lines = [", ".join(f"{count:,} {what}" for what, count in report.source.items())]
     lines.append(f"{report.poses:,} poses in {report.seconds:.1f} s")
     if report.latency_p50_ms is not None:
         lines.append(f"datagram to pose: p50 {report.latency_p50_ms:.2f} ms, p99 {report.latency_p99_ms:.2f} ms")
     for name, sink in report.sinks.items():
         dropped = f", {sink.dropped:,} dropped because it was too slow" if sink.dropped else ""
-        lines.append(f"{name}: {sink.written:,} poses{dropped}{', ended early' if sink.error else ''}")
+        what = "frames" if takes_frames(name) else "poses"
+        lines.append(f"{name}: {sink.written:,} {what}{dropped}{', ended early' if sink.error else ''}")
     return "\n".join(lines)
 
 
