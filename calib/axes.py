@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 ROUNDS = 12
 PRIOR_RAD = np.radians(3.0)
 """How far off the shape alone leaves the axes."""
-STYLE_MM = 1.0
-"""How much a performer's way of making a pose differs from the rig's, beside K."""
+LEAST_STYLE_MM = 0.1
+"""A performer's way of making a pose differs from the rig's, beside K, by as much as the misfits say, and by this."""
 FARTHEST_RAD = np.radians(8.0)
 
 
@@ -47,8 +47,10 @@ def _turn(pairs: Pairs, K: Array, R_so_far: Array) -> Array:
     slope = np.where(x >= 0, K[0], K[1])
     misfit = y - predicted(K, x)
     J = slope[..., None] * -_cross_matrices(x)  # d(r x x)/dr = -[x]
-    huber = np.minimum(1.0, STYLE_MM / np.maximum(np.linalg.norm(misfit, axis=-1), 1e-9))
-    weights = (pairs.weights * huber)[..., None] / STYLE_MM**2
+    off = np.linalg.norm(misfit, axis=-1)
+    counted = off[pairs.weights > 0]
+    style = max(LEAST_STYLE_MM, float(np.median(counted)) if counted.size else 0.0)
+    weights = (pairs.weights * np.minimum(1.0, style / np.maximum(off, 1e-9)))[..., None] / style**2
     information = np.einsum("psxi,psxj->ij", J * weights[..., None], J) + np.eye(3) / PRIOR_RAD**2
     right = np.einsum("psxi,psx->i", J * weights[..., None], misfit) - _vector(R_so_far) / PRIOR_RAD**2
     return _rotation(np.linalg.solve(information, right))

@@ -27,12 +27,15 @@ if TYPE_CHECKING:
 LEAST_OPENING_RAD = np.radians(6.0)
 """A smaller opening bends its path too little to show the hinge."""
 LEAST_FRAMES = 20
-MOST_FRAMES = 1200
+LEAST_MEMBERS = 8
+MOST_FRAMES = 2000
 GROUPS = 8
 """The fit uses so many frames at most, as many of each of so many turns."""
 OPEN_RAD = np.radians(1.5)
 OPEN_SHARE = 0.3
 """Less open than this part of the widest, the chin tells of muscles rather than of the hinge."""
+STRAY = 1.25
+"""Turns beyond the widest that lasts are misread markers."""
 SIDEWAYS = 0.35
 """Part of the way that a chin which opens may go sideways."""
 LOSS_M = 0.0007
@@ -40,6 +43,8 @@ LOSS_M = 0.0007
 SHARED_ABSORBED = 2.0
 """A wrong hinge hides part of what the skin does; so much more there is than is left."""
 STEPS = 25
+WIDE = 4
+"""The loss starts 2 to this power times as wide, so that a hinge far from the rig's is found too."""
 DONE = 1e-4
 PRIOR_PIVOT_M = 0.012
 PRIOR_AXIS_RAD = np.radians(4.0)
@@ -114,7 +119,7 @@ def _rest_on_path(rest: Array, path: Array, rate_hz: float) -> tuple[Array, floa
         seconds = closed.sum() / rate_hz
         if seconds < CLOSED_S:
             return rest, PRIOR_REST_M
-        rest = path[closed].mean(axis=0)
+        rest = np.median(path[closed], axis=0)  # half-made expressions pull at a mean
     return rest, max(PRIOR_REST_M / np.sqrt(seconds * INDEPENDENT_HZ), PRIOR_REST_M / 5)
 
 
@@ -135,6 +140,7 @@ def _opening_frames(rest: Array, path: Array, axis: Array, pivot: Array) -> tupl
     widest = float(np.nanquantile(turns, 0.99)) if np.isfinite(turns).any() else 0.0
     opens = np.flatnonzero(np.nan_to_num(turns) > max(OPEN_RAD, OPEN_SHARE * widest))
     opens = opens[straight[opens]]
+    opens = opens[turns[opens] < STRAY * widest]
     if len(opens) < LEAST_FRAMES:
         raise _hardly_opened(widest)
     parts = [_thinned(part) for part in _by_turn(opens, turns[opens])]
@@ -142,9 +148,10 @@ def _opening_frames(rest: Array, path: Array, axis: Array, pivot: Array) -> tupl
 
 
 def _by_turn(frames: NDArray[np.intp], turns: Array) -> list[NDArray[np.intp]]:
-    """The frames in groups of about the same turn."""
-    group = np.digitize(turns, np.linspace(turns.min(), turns.max(), GROUPS + 1)[1:-1])
-    return [frames[group == g] for g in range(GROUPS)]
+    """The frames in groups of about the same turn; a group of a few stray frames is none."""
+    group = np.digitize(turns, np.linspace(turns.min(), np.quantile(turns, 0.98), GROUPS + 1)[1:-1])
+    groups = [frames[group == g] for g in range(GROUPS)]
+    return [members if len(members) >= LEAST_MEMBERS else members[:0] for members in groups]
 
 
 def _thinned(frames: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -197,11 +204,12 @@ def _fit(model: _Model, independent: float, rest_sd: float) -> _Fit:
     prior[:4] = np.repeat([PRIOR_AXIS_RAD**-2, PRIOR_PIVOT_M**-2], 2)
     scales = np.concatenate([np.repeat([0.1, 0.01], 2), np.full(model.rest.size, 1e-4)])
     parameters = np.zeros(len(prior))
-    for _ in range(STEPS):
-        information, gradient = _normal_equations(model, parameters, independent)
+    for number in range(STEPS):
+        loss_m = LOSS_M * max(1.0, 2.0 ** (WIDE - number))
+        information, gradient = _normal_equations(model, parameters, independent, loss_m)
         step = np.linalg.solve(information + np.diag(prior), gradient - prior * parameters)
         parameters = parameters + step * min(1.0, 1.0 / float(np.abs(step / scales).max()) if step.any() else 1.0)
-        if np.abs(step / scales).max() < DONE:
+        if loss_m == LOSS_M and np.abs(step / scales).max() < DONE:
             break
     covariance = np.linalg.inv(information + np.diag(prior))
     alone = np.linalg.inv(information + np.diag(rest_prior) + 1e-6 * np.eye(len(prior)))
@@ -219,24 +227,24 @@ def _spreads(covariance: ArrayLike) -> tuple[float, float]:
     return float(best), float(worst)
 
 
-def _normal_equations(model: _Model, parameters: Array, independent: float) -> tuple[Array, Array]:
+def _normal_equations(model: _Model, parameters: Array, independent: float, loss_m: float) -> tuple[Array, Array]:
     """J^T W J and J^T W r of the path, in units of its own spread."""
     steps = np.concatenate([np.repeat([1e-5, 1e-6], 2), np.full(model.rest.size, 1e-6)])
     misfit = model.misfit(parameters)
     moved = np.diag(steps) + parameters
     J = np.stack([(model.misfit(p) - misfit).ravel() / step for p, step in zip(moved, steps, strict=True)], axis=1)
-    weight = np.repeat(_weights(misfit, model.groups, independent).ravel(), 3)
+    weight = np.repeat(_weights(misfit, model.groups, independent, loss_m).ravel(), 3)
     return (J * weight[:, None]).T @ J, -(J * weight[:, None]).T @ misfit.ravel()
 
 
-def _weights(misfit: Array, groups: NDArray[np.intp], independent: float) -> Array:
+def _weights(misfit: Array, groups: NDArray[np.intp], independent: float, loss_m: float) -> Array:
     """(F, N) [1/m^2]: Cauchy's weights over variances, so that a group of frames of one turn counts as its mean does.
 
     That mean is off by the noise, which many frames even out, and by what the skin does beside the bone at this turn,
     which they do not: the misfit that all frames of a group share.
     """
     off = np.linalg.norm(misfit, axis=2)
-    robust = np.where(off > 0, 1.0 / (1.0 + (off / LOSS_M) ** 2), 0.0)
+    robust = np.where(off > 0, 1.0 / (1.0 + (off / loss_m) ** 2), 0.0)
     members = groups == np.arange(GROUPS)[:, None]  # (G, F)
     total = np.maximum(members @ robust, 1e-9)
     mean = np.einsum("gf,fn,fnx->gnx", members, robust, misfit) / total[..., None]

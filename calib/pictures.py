@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT = 230, 270
 BACKGROUND = (240, 242, 245)
-TURN_RAD = 0.35
+TURN_RAD = 0.28
 """Somewhat from the side, so that what goes forward is seen too."""
 
 

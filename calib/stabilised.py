@@ -30,7 +30,7 @@ SEEN_SHARE = 0.5
 """Part of the frames in which the head must be seen."""
 NEIGHBOURS_S = 0.05
 JITTER_S = 0.02
-EXCHANGEABLE_M = 0.006
+EXCHANGEABLE_M = 0.0025
 """Head markers that fit their own template this well in another order cannot be told apart [m]."""
 MOST_PERMUTED = 6
 """Up to this many head markers all orders are tried, above it exchanges of two."""

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 RISE_S, HOLD_S, FALL_S, REST_S = 0.4, 0.8, 0.4, 0.3
 EXPRESSION_S = RISE_S + HOLD_S + FALL_S + REST_S
 SPEECH_S = 5.0
+OPENINGS = 3
 NOISE_M = 0.0003
 DROPOUTS, OUTLIERS = 0.10, 0.05
 
@@ -76,9 +77,13 @@ def range_of_motion(
     only: Sequence[str] | None = None,
     rounds: int = 2,
 ) -> SyntheticTake:
-    """Every expression of the rig (or of `only`) `rounds` times in any order, with speech after the first round."""
+    """Every expression of the rig (or of `only`) `rounds` times in any order, with speech after the first round.
+
+    The mouth opens `OPENINGS` times as often as the rest: its hinge is what a short arc tells least of.
+    """
     rig_range = RigRange(face.rig, tuple(face.rig.sites))
     extremes = [e for e in rig_range.extremes() if only is None or e.name in only]
+    extremes += [e for e in extremes if e.name == "jawOpen"] * (OPENINGS - 1)
     order = [extremes[i] for _ in range(rounds) for i in rng.permutation(len(extremes))]
     seconds = REST_S + EXPRESSION_S * len(order) + SPEECH_S
     times = np.arange(round(seconds * rate_hz)) / rate_hz
