@@ -1,8 +1,8 @@
 """Reading the datagrams of one server, whose bitstream is known only as far as it tells.
 
-Servers answer CONNECT with the version that they speak, not always with the one that they send after they were asked for
-another. So the version asked for and the one announced are tried where the other does not fit; from 4.1 the sizes of a
-frame's sections tell reliably which it is.
+Servers answer CONNECT with the version that they speak, not always with the one that they send after they were asked
+for another. So the version asked for and the one announced are tried where the other does not fit; from 4.1 the sizes
+of a frame's sections tell reliably which it is.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What a stream's frame numbers tell: which frames were lost, which came twice, which came too late to be used.
 
-Numbers alone do not tell a frame that comes again from a take that is played again, a short one in a loop above all. The
-sender's clock does, from 3.0; without it, three frames in a row that are not new are taken to be another beginning, and
-many in a row in any case, as clocks start over too.
+Numbers alone do not tell a frame that comes again from a take that is played again, a short one in a loop above all.
+The sender's clock does, from 3.0; without it, three frames in a row that are not new are taken to be another beginning,
+and many in a row in any case, as clocks start over too.
 """
 
 from __future__ import annotations

@@ -81,8 +81,8 @@ class NatNetSource:
 
     def __next__(self) -> MarkerFrame:
         if self._first is not None:
-            frame, self._first = self._first, None
-            return frame
+            first, self._first = self._first, None
+            return first
         link = self._opened()
         while self._session.phase is not Phase.ENDED and not link.closed:
             frame = self._step(link, _LONGEST_WAIT_S)
