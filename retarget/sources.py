@@ -235,16 +235,21 @@ class Paced:
             yield frame
 
 
-def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> Source:
+def open_source(where: str, tap: Callable[[Datagram], None] | None = None, detector: str | None = None) -> Source:
     """The source for a file or an address, not yet opened; `tap` is given every datagram of a live one.
 
-    InputError where no source takes `where`, and for a `tap` on what cannot be recorded.
+    `detector` finds the landmarks where the source is pictures. InputError where no source takes `where`, and for a
+    `tap` on what cannot be recorded.
     """
     name = _kind(where)
     if name in RECORDABLE:
         return RECORDABLE[name](where, tap)
     if tap is not None:
         raise InputError(f"{where} cannot be recorded; only a stream from {', '.join(_addresses(RECORDABLE))} can.")
+    if name in PICTURES:
+        from retarget.camera.source import CameraSource
+
+        return CameraSource(where, detector or "mediapipe")
     if name in OTHERS:
         return OTHERS[name](where)
     for entry in entry_points(group="retarget.sources", name=name):
@@ -258,13 +263,13 @@ def open_source(where: str, tap: Callable[[Datagram], None] | None = None) -> So
 def known_sources() -> list[str]:
     """What a source can be, for people to read."""
     others = sorted(entry.name for entry in entry_points(group="retarget.sources"))
-    endings = [f"*{ending}" for ending in OTHERS if ending.startswith(".")]
+    endings = [f"*{ending}" for ending in (*OTHERS, *FILM_ENDINGS) if ending.startswith(".")]
     return [*_addresses(RECORDABLE), "udp://:PORT", "camera:0", "a folder of pictures", *endings, *others]
 
 
 def are_landmarks(where: str) -> bool:
     """Whether the points of this source are found in pictures, which is noisier than markers are."""
-    return _kind(where) in {"udp", "camera", "folder", *FILM_ENDINGS}
+    return _kind(where) in {"udp", *PICTURES}
 
 
 def _kind(where: str) -> str:
@@ -304,16 +309,10 @@ def _landmarks(where: str) -> Source:
     return LandmarkSource(where)
 
 
-def _camera(where: str) -> Source:
-    from retarget.camera.source import CameraSource
-
-    return CameraSource(where)
-
-
+PICTURES = ("camera", "folder", *FILM_ENDINGS)
 RECORDABLE: dict[str, Callable[[str, Callable[[Datagram], None] | None], Source]] = {"natnet": _natnet}
 OTHERS: dict[str, Callable[[str], Source]] = {
     "udp": _landmarks,
     **dict.fromkeys((".mcap", ".pcapng", ".pcap"), _take),
     **dict.fromkeys((".c3d", ".trc", ".csv"), _clip),
-    **dict.fromkeys(("camera", "folder", *FILM_ENDINGS), _camera),
 }

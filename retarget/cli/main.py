@@ -20,6 +20,7 @@ COMMANDS = {
     "convert": "Change a take's or a marker file's format.",
     "inspect": "Show what is in a take, a rig or a performer file.",
     "doctor": "Find out why a live stream does not come, step by step.",
+    "models": "List or fetch the models that find landmarks in pictures.",
     "remote": "Tell a NatNet server to record or to play back.",
     "bench": "Print figures beside those of other programs.",
     "rigs": "List the rigs that can be driven.",

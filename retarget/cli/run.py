@@ -36,6 +36,7 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv, udp://HOST:PORT ...; may be g
 @click.option("--rig", default="human", show_default=True, help="Name of a rig, or the path of a rig.toml.")
 @click.option("--performer", type=click.Path(), help="A calibration; without it the first still moment is the neutral.")
 @click.option("--layout", help="Name of a layout, or the path of its TOML file.  [the one whose names fit best]")
+@click.option("--detector", help="Of landmarks in pictures: mediapipe, mediapipe468, mediapipe68, lbf:MODEL.yaml")
 @click.option("--record", type=click.Path(), metavar="TAKE", help="Also record a live source, to a new .mcap file.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long.")
 @click.option("--drive", type=click.Choice(["joints", "shapes", "both"]), default="joints", show_default=True)
@@ -72,9 +73,11 @@ def perform(where: str, targets: tuple[str, ...], seconds: float | None, options
 
     files = tuple(target for target in targets if target != WINDOW)
     session = None if all(map(takes_frames, targets)) else _session(where, options)
-    open_source(where, (lambda _: None) if options["record"] else None)  # what cannot be is told before a take is made
+    tap = (lambda _: None) if options["record"] else None
+    open_source(where, tap, options["detector"])  # what cannot be is told before a take is made
     with ExitStack() as stack:
-        opened = open_source(where, stack.enter_context(_recorder(where, options)) if options["record"] else None)
+        recorder = stack.enter_context(_recorder(where, options)) if options["record"] else None
+        opened = open_source(where, recorder, options["detector"])
         watched = WINDOW in targets or any(map(takes_frames, targets))
         source = Paced(opened) if watched and not opened.live else opened
         window = stack.enter_context(_window(options)) if WINDOW in targets else None
