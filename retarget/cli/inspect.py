@@ -43,7 +43,7 @@ def command(what: str, plot: str | None, *, as_json: bool) -> None:
         from retarget.performer import load_performer
 
         performer = load_performer(path)
-        _show(performer_facts(performer), as_json, lambda: _print_facts(performer_facts(performer)))
+        _show(performer_facts(performer), as_json, lambda: _print_performer(performer))
         return
     from retarget.rig.load import load_rig
 
@@ -67,17 +67,21 @@ def rig_facts(rig: Rig) -> dict[str, Any]:
 
 
 def performer_facts(performer: Performer) -> dict[str, Any]:
-    """What can be said of a performer in numbers and names."""
+    """What can be said of a performer in numbers and names; lengths in metres, angles in radians."""
+    jaw = performer.jaw
     return {
         "performer": performer.name,
         "rig": performer.rig,
         "layout": performer.layout,
         "date": performer.date.isoformat(),
-        "size of the rig over the performer's": performer.scale,
+        "scale": performer.scale,
         "markers": list(performer.markers),
         "head markers": list(performer.head_markers),
+        "jaw": {"axis": jaw.axis.tolist(), "pivot": jaw.pivot.tolist(), "gain": jaw.gain} if jaw else None,
         "K": {site: K.tolist() for site, K in performer.K.items()},
-        "jaw gain": performer.jaw.gain if performer.jaw else None,
+        "ranges": {site: reach.tolist() for site, reach in performer.ranges.items()},
+        "quality": dict(performer.quality),
+        "fixed": list(performer.fixed),
     }
 
 
@@ -105,6 +109,24 @@ def _print_facts(facts: dict[str, Any]) -> None:
         else:
             text = str(value)
         click.echo(f"{name}: {text}")
+
+
+def _print_performer(performer: Performer) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    facts = performer_facts(performer)
+    _print_facts({name: facts[name] for name in ("performer", "rig", "layout", "date", "scale")})
+    _print_facts({name.replace("_", " "): f"{value:.4g}" for name, value in performer.quality.items()})
+    if performer.fixed:
+        _print_facts({"fixed by hand": facts["fixed"]})
+    table = Table("site", "K left", "right", "up", "down", "forward", "back", "went up", "down [mm]", box=None)
+    for site, K in performer.K.items():
+        positive, negative = (K, K) if K.ndim == 2 else K
+        gains = [f"{gain[i, i]:.2f}" for i in range(3) for gain in (positive, negative)]
+        reach = performer.ranges.get(site)
+        table.add_row(site, *gains, *([] if reach is None else [f"{1e3 * abs(side[1]):.1f}" for side in reach]))
+    Console(width=None if sys.stdout.isatty() else 120).print(table)
 
 
 def _print_take(inspection: Inspection) -> None:
