@@ -158,7 +158,7 @@ def _read_rig(path: Path) -> Rig:
         jaw=_jaw(root.table("jaw"), joints, places["jaw"], origin) if "jaw" in places else None,
         licence=_licence(root.table("licence")),
         responses=read_responses(root.table("responses"), mesh.shape_names),
-        secondary=_secondary(root.table("secondary"), joints, places),
+        secondary=_secondary(root.table("secondary"), mesh, places),
     )
 
 
@@ -227,12 +227,13 @@ def _jaw(table: Table, joints: Joints, joint: int, origin: Array) -> Jaw:
     return Jaw(joint, axis / length, pivot, float(np.radians(least)), float(np.radians(most)))
 
 
-def _secondary(table: Table, joints: Joints, places: dict[str, int]) -> dict[int, PdGains]:
+def _secondary(table: Table, mesh: _Mesh, places: dict[str, int]) -> dict[int, PdGains]:
+    joints = mesh.joints
     driven = {joint: what for what, joint in places.items()}
     gains = {}
     for name in table.values:
         if name not in joints.names:
-            raise table.wrong(name, f"is no joint of the mesh{_near(name, joints.names)}")
+            raise table.wrong(name, f"is no joint of the mesh{_near(name, mesh.node_names)}")
         joint = joints.index(name)
         if joint in driven:
             raise table.wrong(name, f"is driven already, as {driven[joint]}, and cannot trail")
