@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 STRENGTH = 0.1
 """[mm^2]: displacements good to a tenth of a millimetre or so, neighbours' K alike to about a third."""
-ANCHOR = 0.003
+ANCHOR = 0.001
 """[mm^2]: only what nothing else tells."""
 REWEIGHTINGS = 6
 HUBER = 1.345

@@ -29,11 +29,12 @@ if TYPE_CHECKING:
 
 ALIKE = 0.5
 """Cosine from which on a frame can show an expression."""
-EXERCISED = 0.25
+EXERCISED = 0.3
 """Part of the rig's own strength (at the performer's size) below which an expression was not made."""
 NEAR_TOP = 0.88
 LASTING_S = 0.1
-FEWEST_FRAMES = 4
+BRIEFEST_S = 0.15
+"""What lasts for less, near its strongest, was no expression."""
 LEAST_SEEN = 0.3
 """Part of the frames in which a site must be seen."""
 APART_S = 0.5
@@ -135,7 +136,7 @@ def _match(motion: Motion, name: str, side: str, shows: Mask, likeness: Array, s
     lasting = np.where(enough & shows, lasting, -np.inf)
     top = int(np.argmax(lasting))
     frames = np.flatnonzero(lasting >= NEAR_TOP * lasting[top])
-    if lasting[top] < EXERCISED * full or len(frames) < FEWEST_FRAMES:
+    if lasting[top] < EXERCISED * full or len(frames) < BRIEFEST_S * rate_hz:
         share = max(float(lasting[top]) / full, 0.0) if np.isfinite(lasting[top]) else 0.0
         return Match(name, side, share, 0.0, np.full(motion.moves.shape[1:], np.nan), np.nan, np.zeros(0, np.intp), -1)
     turn = motion.turn_rad[frames]

@@ -1,8 +1,8 @@
 """How near a calibration comes to a synthetic performer of whom everything is known.
 
 The head's axes of the calibration and of the truth differ by what the shape of a face leaves open, so directions and
-places are compared after both neutrals were laid onto each other. K is told where the rig goes by `TOLD_M` or more along
-the axis, ten times the noise: what the rig never does there, no performance can tell.
+places are compared after both neutrals were laid onto each other. K is told where the rig goes by `TOLD_M` or more
+along the axis, ten times the noise: what the rig never does there, no performance can tell.
 """
 
 from __future__ import annotations

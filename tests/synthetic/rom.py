@@ -14,17 +14,17 @@ import numpy as np
 
 from calib.expressions import BY_NAME, side_of
 from calib.rig_range import RigRange
-from retarget import geometry
 from retarget.performer import gain_matrix
 from tests.synthetic.capture import captured, with_dropouts, with_noise, with_outliers
 from tests.synthetic.face import make_face
 from tests.synthetic.motion import FaceMotion, bump, head_motion, syllables
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from calib.rig_range import RigExtreme
     from retarget.frames import MarkerLayout
     from retarget.rig.model import Rig
     from tests.synthetic.capture import SyntheticTake
@@ -76,13 +76,16 @@ def range_of_motion(
     rate_hz: float = 120.0,
     only: Sequence[str] | None = None,
     rounds: int = 2,
+    still_sides: Mapping[str, str] | None = None,
 ) -> SyntheticTake:
     """Every expression of the rig (or of `only`) `rounds` times in any order, with speech after the first round.
 
-    The mouth opens `OPENINGS` times as often as the rest: its hinge is what a short arc tells least of.
+    `still_sides` names expressions that are made without their Left or Right. The mouth opens `OPENINGS` times as often
+    as the rest: its hinge is what a short arc tells least of.
     """
     rig_range = RigRange(face.rig, tuple(face.rig.sites))
     extremes = [e for e in rig_range.extremes() if only is None or e.name in only]
+    extremes = [_without_side(e, rig_range.sites, (still_sides or {}).get(e.name, "")) for e in extremes]
     extremes += [e for e in extremes if e.name == "jawOpen"] * (OPENINGS - 1)
     order = [extremes[i] for _ in range(rounds) for i in rng.permutation(len(extremes))]
     seconds = REST_S + EXPRESSION_S * len(order) + SPEECH_S
@@ -131,13 +134,9 @@ def rough(take: SyntheticTake, rng: np.random.Generator) -> SyntheticTake:
     return with_outliers(with_dropouts(noisy, rng, DROPOUTS), rng, OUTLIERS)
 
 
-def one_sided(moves: Array, sites: Sequence[str], side: str) -> Array:
-    """(S, 3) with the other side at rest."""
-    one: Array = moves * np.array([side_of(site) in ("", side) for site in sites])[:, None]
-    return one
-
-
-def head_turn_between(a: Array, b: Array) -> float:
-    """Angle between two rotations (3, 3) [rad]."""
-    q = geometry.quat_from_matrix(a.T @ b)
-    return float(2 * np.arctan2(np.linalg.norm(q[:3]), q[3]))
+def _without_side(extreme: RigExtreme, sites: Sequence[str], side: str) -> RigExtreme:
+    """The same with the sites of one side, and those in the middle, at rest."""
+    if not side:
+        return extreme
+    moving = np.array([side_of(site) not in ("", side) for site in sites])
+    return replace(extreme, moves=extreme.moves * moving[:, None])
