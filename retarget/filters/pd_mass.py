@@ -121,10 +121,15 @@ class PdMass:
         self._settle(first, values)
         target = np.zeros((len(values), 3))
         target[:, 0] = values
-        powers = self._factors ** (self._rate_hz * np.where(new, steps, 1.0))[:, None]
-        moved = ((self._state - target) @ self._to_modes.T * powers @ self._modes.T).real + target
+        moved = ((self._state - target) @ self._to_modes.T * self._powers(steps) @ self._modes.T).real + target
         self._state = np.where(new[:, None], self._stopped(moved), self._state)
         return self._state[:, 0].copy()
+
+    def _powers(self, steps: Array) -> Array:
+        """(N, 3) by how much each mode shrinks in `steps` (N,) [s]; nearly always these are one number."""
+        different, which = np.unique(np.where(np.isfinite(steps), steps, 0.0), return_inverse=True)
+        powers: Array = (self._factors ** (self._rate_hz * different)[:, None])[which]
+        return powers
 
     def rest(self, where: Mask, value: float) -> None:
         """The masses `where` (N,) rest at `value`."""
