@@ -18,10 +18,12 @@ from hypothesis.extra import numpy as hnp
 
 from retarget.errors import InputError, OutputError
 from retarget.performer import (
+    QUALITY,
     Performer,
     PerformerJaw,
     gain_matrix,
     load_performer,
+    moved_by,
     performer_text,
     save_performer,
 )
@@ -69,6 +71,11 @@ def assert_same(a: Performer, b: Performer) -> None:
     assert a.K.keys() == b.K.keys()
     for site in a.K:
         np.testing.assert_allclose(a.K[site], b.K[site], rtol=1e-6)
+    assert a.fixed == b.fixed
+    assert a.ranges.keys() == b.ranges.keys()
+    for site in a.ranges:
+        np.testing.assert_allclose(a.ranges[site], b.ranges[site], atol=0.51e-7, rtol=1e-9)
+    assert dict(a.quality) == pytest.approx(dict(b.quality), rel=1e-3)
     assert (a.jaw is None) == (b.jaw is None)
     if a.jaw and b.jaw:
         np.testing.assert_allclose(a.jaw.axis, b.jaw.axis, atol=1e-6)
@@ -76,6 +83,9 @@ def assert_same(a: Performer, b: Performer) -> None:
         numbers = ("gain", "min_rad", "max_rad")
         assert [getattr(a.jaw, n) for n in numbers] == pytest.approx([getattr(b.jaw, n) for n in numbers], rel=1e-6)
         assert a.jaw.mode == b.jaw.mode
+        slides = ("forward_m", "left_m", "right_m")
+        ours, theirs = ([getattr(jaw, n) for n in slides] for jaw in (a.jaw, b.jaw))
+        np.testing.assert_allclose(ours, theirs, atol=0.51e-7, rtol=1e-9)
 
 
 def performers() -> st.SearchStrategy[Performer]:
@@ -83,7 +93,9 @@ def performers() -> st.SearchStrategy[Performer]:
     text = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
     metres = st.floats(-2, 2)
     factor = st.floats(-10, 10).map(lambda x: 0.0 if abs(x) < 1e-30 else x)
-    gain = st.one_of(factor, st.lists(factor, min_size=3, max_size=3), hnp.arrays(float, (3, 3), elements=factor))
+    shapes = st.sampled_from([(3,), (3, 3), (2, 3)])
+    gain = st.one_of(factor, shapes.flatmap(lambda shape: hnp.arrays(float, shape, elements=factor)))
+    slide = st.just(math.nan) | st.floats(0, 0.05)
     vector = hnp.arrays(float, 3, elements=metres)
     direction = hnp.arrays(float, 3, elements=st.floats(-1, 1)).filter(lambda v: np.linalg.norm(v) > 0.1)
     jaw = st.builds(
@@ -94,6 +106,9 @@ def performers() -> st.SearchStrategy[Performer]:
         min_rad=st.floats(-math.pi, -1e-6),
         max_rad=st.floats(1e-6, math.pi),
         mode=st.sampled_from(["signed", "cosine"]),
+        forward_m=slide,
+        left_m=slide,
+        right_m=slide,
     )
 
     def with_markers(names: list[str]) -> st.SearchStrategy[Performer]:
@@ -113,6 +128,9 @@ def performers() -> st.SearchStrategy[Performer]:
             scale=st.floats(1e-3, 1e3),
             K=st.dictionaries(text, gain.map(gain_matrix), max_size=3),
             jaw=st.none() | jaw,
+            ranges=st.dictionaries(text, hnp.arrays(float, (2, 3), elements=metres), max_size=2),
+            quality=st.dictionaries(st.sampled_from(sorted(QUALITY)), st.floats(0, 100), max_size=3),
+            fixed=st.sampled_from([(), ("scale",)]),
         )
 
     return st.lists(text, max_size=5, unique=True).flatmap(with_markers)
@@ -133,6 +151,28 @@ def test_a_gain_is_written_as_briefly_as_it_can_be() -> None:
     K = {"a": gain_matrix(0.5), "b": gain_matrix([0.5, 1, 1]), "c": np.arange(9.0).reshape(3, 3)}
     written = tomllib.loads(performer_text(replace(ANA, K=K)))["K"]
     assert written == {"a": 0.5, "b": [0.5, 1, 1], "c": [[0, 1, 2], [3, 4, 5], [6, 7, 8]]}
+
+
+def test_a_gain_that_differs_by_direction_names_its_directions() -> None:
+    K = {"a": gain_matrix([[0.5, 0.6, 0.7], [0.5, 0.2, 0.3]])}
+    written = tomllib.loads(performer_text(replace(ANA, K=K)))["K"]
+    assert written == {"a": {"x": 0.5, "up": 0.6, "down": 0.2, "forward": 0.7, "back": 0.3}}
+
+
+def test_directions_that_a_person_types_are_those_of_the_performer(ana_toml: Path) -> None:
+    edited(ana_toml, "chin = [0.5, 0.8, 1]", "chin = { left = 1, right = 2, up = 3, down = 4, z = 5 }")
+    K = load_performer(ana_toml).K["chin"]
+    moved = moved_by(K, np.array([[0.001, 0.001, 0.001], [-0.001, -0.001, -0.001]]))
+    np.testing.assert_allclose(1e3 * moved, [[1, 3, 5], [-2, -4, -5]])
+
+
+def test_a_file_without_what_calibration_adds_still_loads(ana_toml: Path) -> None:
+    text = ana_toml.read_text()
+    assert not any(key in text for key in ("[ranges]", "[quality]", "fixed", "forward_m"))
+    performer = load_performer(ana_toml)
+    assert (dict(performer.ranges), dict(performer.quality), performer.fixed) == ({}, {}, ())
+    assert performer.jaw is not None
+    assert math.isnan(performer.jaw.forward_m)
 
 
 def test_a_marker_without_a_neutral_is_left_out_and_read_as_missing(ana_toml: Path) -> None:
@@ -181,6 +221,22 @@ def edited(path: Path, old: str, new: str) -> None:
         ('head_markers = ["headFrontLeft"]', 'head_markers = ["crown"]', ["'crown'"]),
         ("markers = [", "markers = [3, ", ["'markers'", "list of different names"]),
         ("[jaw]", "[[jaw]]", ["'jaw'", "must be a table"]),
+        ("chin = [0.5, 0.8, 1]", "chin = { x = 1, up = 0.5, down = 0.6 }", ["'forward' in [chin] is missing"]),
+        (
+            "chin = [0.5, 0.8, 1]",
+            "chin = { x = 1, y = 1, z = 1, up = 0.5 }",
+            ["'y' in [chin]", "stands for up and down"],
+        ),
+        (
+            "chin = [0.5, 0.8, 1]",
+            "chin = { x = 1, y = 1, foward = 1, back = 1 }",
+            ["'foward'", "did you mean 'forward'"],
+        ),
+        ("scale = 0.95", 'scale = 0.95\nfixed = ["K.chim.up"]', ["'fixed' on line 8", "did you mean 'K.chin.up'"]),
+        ("scale = 0.95", 'scale = 0.95\nfixed = ["everything"]', ["'fixed' on line 8", "no value here"]),
+        ("[neutral]", "[ranges]\nchin = [0.1, 0.2]\n[neutral]", ["'chin' in [ranges]", "six numbers"]),
+        ("[neutral]", "[quality]\nbeauty = 1\n[neutral]", ["'beauty' in [quality]", "the keys here are"]),
+        ("gain = 0.9", "gain = 0.9\nforward_m = inf", ["'forward_m' in [jaw]", "finite"]),
         ("version = 1", "version 1", ["not a TOML text", "line 1"]),
         ("version = 1", "version = " + "[" * 5000, ["not a TOML text"]),
         ("version = 1", "version = " + "9" * 5000, ["not a TOML text"]),
@@ -213,7 +269,7 @@ def test_no_damage_to_the_file_ends_in_anything_but_an_input_error(
     except InputError:
         return
     assert np.isfinite(performer.scale)
-    assert all(matrix.shape == (3, 3) and np.isfinite(matrix).all() for matrix in performer.K.values())
+    assert all(matrix.shape in ((3, 3), (2, 3, 3)) and np.isfinite(matrix).all() for matrix in performer.K.values())
 
 
 def test_a_file_that_is_not_there_or_no_text_is_named(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ class _SiteMotion:
         translations[self._joints] += (self._R_parent_rig @ moves[:, :, None])[:, :, 0]
 
     def _scaled(self, moved: Array) -> Array:
-        """K times the displacements (N, 3), with another K for what goes towards the negative side where there is one."""
+        """K times the displacements (N, 3); what they have on the negative side of an axis may have a K of its own."""
         if self._K_back is None:
             return (self._K @ moved[:, :, None])[:, :, 0]
         ahead = np.maximum(moved, 0.0)

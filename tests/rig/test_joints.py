@@ -113,6 +113,42 @@ def test_a_joint_moves_by_K_times_the_displacement_in_head_and_no_other_moves(
         np.testing.assert_allclose(place - rig.sites[name].rest, expected, atol=1e-12)
 
 
+@both_axes
+@pytest.mark.parametrize("site", ["browInnerLeft", "lipLower"])
+def test_a_K_by_direction_takes_each_axis_by_the_side_to_which_it_went(site: str, axes: Axes) -> None:
+    rig, layout = small_rig(axes), layout_of(*SITES)
+    K = [[0.5, 0.6, 0.7], [0.1, 0.2, 0.3]]
+    performer = performer_for(rig, layout, K={site: gain_matrix(K), "mandibleLeft": gain_matrix(0.5)})
+    positions = performer.neutral.copy()
+    positions[SITES.index(site)] += [0.004, -0.003, 0.002]
+    positions[SITES.index("mandibleLeft")] += [-0.002, 0.0, 0.002]
+    places = site_places(rig, JointMapping(rig, layout, performer)(frame_of(layout, positions)))
+    np.testing.assert_allclose(places[site] - rig.sites[site].rest, [0.002, -0.0006, 0.0014], atol=1e-12)
+    moved = places["mandibleLeft"] - rig.sites["mandibleLeft"].rest
+    np.testing.assert_allclose(moved, [-0.001, 0.0, 0.001], atol=1e-12)
+
+
+@both_axes
+def test_a_jaw_pushed_forward_reads_as_closing_and_moves_chin_and_lip_instead(axes: Axes) -> None:
+    """The rig's jaw cannot close further, so nothing is taken back and all of the way is left to the joints."""
+    rig, layout = small_rig(axes), layout_of(*SITES)
+    assert rig.jaw is not None
+    performer = performer_for(rig, layout)
+    assert performer.jaw is not None
+    performer = replace(performer, jaw=replace(performer.jaw, min_rad=0.0))
+    mapping = JointMapping(rig, layout, performer)
+    positions = performer.neutral.copy()
+    riders = [SITES.index(site) for site in ("lipLower", "mandibleLeft", "chin")]
+    positions[riders] += [0.0, 0.0, 0.006]
+    frame = frame_of(layout, positions)
+    assert math.degrees(mapping.jaw_angle(frame)) < -1.5
+    pose = mapping(frame)
+    assert abs(turned_jaw(rig, pose)) < 1e-9
+    places = site_places(rig, pose)
+    for site in ("lipLower", "mandibleLeft", "chin"):
+        np.testing.assert_allclose(places[site] - rig.sites[site].rest, [0.0, 0.0, 0.006 * SCALE], atol=1e-12)
+
+
 def test_a_site_without_a_K_moves_by_the_size_ratio() -> None:
     rig, layout = small_rig(), layout_of(*SITES)
     performer = performer_for(rig, layout)
