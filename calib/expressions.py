@@ -20,7 +20,7 @@ class Expression:
     sides: bool
     """True where the left and the right can do it apart."""
     never: str
-    """What the report says where it was not seen; {side} is "left ", "right " or nothing."""
+    """What the report says where it was not seen; {side} is "left ", "right " or "left and right "."""
 
 
 EXPRESSIONS = (

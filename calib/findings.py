@@ -56,7 +56,7 @@ def _never(calibration: Calibration) -> Iterator[Finding]:
         sides = [match for match in matches if match.side]
         idle = [match.side for match in sides if not match.exercised]
         if not any(match.exercised for match in matches):
-            yield Finding("missing", _sentence(BY_NAME[name].never.format(side="")))
+            yield Finding("missing", _sentence(BY_NAME[name].never.format(side="left and right ")))
         elif len(idle) == 1:
             yield Finding("missing", _sentence(BY_NAME[name].never.format(side=f"{idle[0].lower()} ")))
     if calibration.extremes and not any(match.exercised for match in calibration.matches):

@@ -55,7 +55,7 @@ def _head(title: str, told: dict[str, Any]) -> str:
         ("expressions made", f"{made} of {len(_names(told))}"),
         ("confidence", f"{100 * quality['confidence']:.0f} %"),
         ("held-out error", f"{quality['held_out_mm']:.1f} mm" if "held_out_mm" in quality else "none held out"),
-        ("jaw opens, times gain", f"{jaw['opening_deg']:.0f}° × {jaw['gain']:.2f}" if jaw else "none"),
+        ("jaw, times its gain", f"{jaw['opening_deg']:.0f}° × {jaw['gain']:.2f}" if jaw else "none"),
         ("head steady within", f"{quality['head_residual_mm']:.2f} mm"),
         ("neutral steady within", f"{quality['neutral_spread_mm']:.2f} mm"),
     ]
