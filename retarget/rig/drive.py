@@ -118,7 +118,7 @@ class _ShapeDrive:
         if self._idle_jaw is not None:
             target = self._sites.with_jaw(moves, pose)
             rotations[self._idle_jaw] = self._sites.rig.joints.rotations[self._idle_jaw]
-        missing = ~(self._markers & seen).any(axis=1)
+        missing = np.count_nonzero(self._markers & seen, axis=1) == 0
         weights = self.solver(np.where(missing[:, None], np.nan, target), pose.time_s)
         left = moves - self._displacements @ weights if self._joints_take_the_rest else np.zeros_like(moves)
         return replace(pose, translations=self._sites.moved(left), rotations=rotations, weights=weights)

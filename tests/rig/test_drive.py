@@ -11,6 +11,7 @@ import pytest
 
 from retarget import geometry
 from retarget.errors import InputError
+from retarget.filters import PdGains
 from retarget.frames import MarkerFrame
 from retarget.performer import gain_matrix
 from retarget.rig.drive import Drive
@@ -241,6 +242,16 @@ def test_a_take_that_begins_again_is_driven_as_the_first_time() -> None:
     first = [drive(frame).weights for frame in frames]
     again = [drive(frame).weights for frame in frames]
     np.testing.assert_array_equal(first, again)
+
+
+def test_joints_marked_secondary_trail_after_the_head() -> None:
+    face, take = performance("face24")
+    trailing = human().joints.index("eyeLeft")  # an eye hangs from nothing, but it carries vertices
+    rig = replace(human(), secondary={trailing: PdGains()})
+    drive, rigid = Drive(rig, face.layout, face.performer), Drive(human(), face.layout, face.performer)
+    apart = [np.abs(drive(f).rotations[trailing] - rigid(f).rotations[trailing]).max() for f in take.stabilised()]
+    assert apart[0] < 1e-9
+    assert max(apart) > 0.005
 
 
 def test_shapes_are_told_apart_into_driven_and_frozen() -> None:
