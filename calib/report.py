@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from calib.expressions import BY_NAME, EXPRESSIONS, REGIONS, region_of
+from calib.expressions import REGIONS, region_of
 from calib.findings import findings
 from calib.fixed import by_direction
 from retarget.performer import DIRECTIONS
@@ -204,8 +204,3 @@ def terminal_table(calibration: Calibration) -> Table:
             f"warp {score.warp:.2f}",
         )
     return table
-
-
-def asked_for() -> list[str]:
-    """What a range of motion should hold, in words."""
-    return [BY_NAME[expression.name].ask for expression in EXPRESSIONS]

@@ -59,11 +59,6 @@ class RigRange:
         self.jaw_rad = self._jaw_range()
         """What the rig's jaw can open [rad]: to the end of its shape, where it has one, within the limits."""
 
-    @property
-    def told(self) -> bool:
-        """True where the rig has any shape that moves a site."""
-        return bool(np.abs(self._fields).max(initial=0.0) > 1e-6)
-
     def extreme(self, name: str, weights: Mapping[str, float]) -> RigExtreme | None:
         """The rig with its shapes at `weights`; None where it has none of them, or they move no site."""
         weights = {shape: w for shape, w in weights.items() if shape in self.rig.shape_names}

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @pytest.mark.parametrize("seed", [3, 13])
 def test_K_hinge_and_angle_of_the_jaw_come_back_from_a_bad_day(human: Rig, seed: int) -> None:
-    """As the issue's figures ask; `python -m tests.benchmarks calib` prints them for twenty performers at 120 Hz."""
+    """Two of the performers; `python -m tests.benchmarks calib` prints twenty at 120 Hz."""
     result = recovered(human, face_layout("all", ALL_SITES), seed, rate_hz=60.0)
     rms = float(np.sqrt((result.noisy_angle_deg**2).mean()))
     print(
