@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 SHRINK = 0.92
 """Against MakeHuman's eyeball, which reaches through the edges of the lids."""
-IRIS_DEG = 25.5
 CORNEA_M = 0.0006
 SEGMENTS = 28
 RINGS_DEG = (4.0, 9.0, 13.0, 17.0, 21.0, 25.5, 30.0, 36.0, 43.0, 52.0, 62.0, 74.0, 88.0, 104.0)
@@ -33,14 +32,16 @@ def fit_sphere(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]
     return middle, float(np.sqrt(rest + middle @ middle))
 
 
-def eyeball(name: str, helper: NDArray[np.float64], moved: Mapping[str, NDArray[np.float64]], joint: int) -> Part:
+def eyeball(
+    name: str, helper: NDArray[np.float64], moved: Mapping[str, NDArray[np.float64]], joint: int, iris_deg: float
+) -> Part:
     """One eye in the place of MakeHuman's helper sphere (N, 3) [m].
 
     `moved` holds where every shape takes the vertices of that sphere; its rigid part is what the new eye does.
     """
     centre, radius = fit_sphere(helper)
     directions, angles = _directions()
-    bulge = CORNEA_M * np.clip(1 - (np.degrees(angles) / (IRIS_DEG + 3)) ** 2, 0, None) ** 1.5
+    bulge = CORNEA_M * np.clip(1 - (np.degrees(angles) / (iris_deg + 3)) ** 2, 0, None) ** 1.5
     positions = centre + directions * (SHRINK * radius + bulge)[:, None]
     triangles = _triangles()
     reach = 0.5 * angles / np.radians(RINGS_DEG[-1])

@@ -63,8 +63,7 @@ def head_of(person: Person) -> Skin:
     skin = close(skin, person.vertices, normal)
     source_uv = np.zeros((skin.lift.shape[0], 2))
     source_uv[skin.triangles] = skin.uv
-    place = skin.positions(person.vertices) - person.eye_middle()
-    return thicken(skin, person.vertices, HAIR_M * hair_cover(place, source_uv))
+    return thicken(skin, person.vertices, HAIR_M * hair_cover(person.on_canvas(skin), source_uv))
 
 
 def bind(skin: Skin, person: Person, wheel: Wheel) -> Face:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from rigs.recipe.person import Person
     from rigs.recipe.skeleton import Skeleton
 
-LASHES = (("1", 20, 0.26), ("2", 40, 0.6))
-"""MakeHuman's strip (lower, upper lid), the number of hairs, their length in widths of the strip."""
 LASH_SEED = 7
 EDGE_BELOW_HELPER_M, FRONT_BEHIND_HELPER_M = 0.0024, 0.0004
 OVERBITE_M, OVERJET_M = 0.0012, 0.0026
@@ -37,17 +35,18 @@ def eyes_part(person: Person, skeleton: Skeleton) -> Part:
         vertices = person.group(group)
         at = person.vertices[vertices]
         moved = {shape: at + offsets for shape, offsets in person.units_of(vertices).items()}
-        parts.append(eyeball(joint, at, moved, skeleton.index(joint)))
+        parts.append(eyeball(joint, at, moved, skeleton.index(joint), person.identity.proportions.iris_deg))
     return join("eyes", parts)
 
 
 def mouth_part(person: Person, skeleton: Skeleton) -> Part:
     """Teeth and tongue."""
     head, jaw = skeleton.index(HEAD), skeleton.index(JAW)
+    size = person.identity.proportions.teeth
     helper = person.vertices[person.group("helper-upper-teeth")]
     edge = np.array([0.0, helper[:, 1].min() - EDGE_BELOW_HELPER_M, helper[:, 2].max() - FRONT_BEHIND_HELPER_M])
-    top = teeth("upperTeeth", UPPER, edge, head)
-    bottom = teeth("lowerTeeth", LOWER, edge + np.array([0.0, OVERBITE_M, -OVERJET_M]), jaw)
+    top = teeth("upperTeeth", UPPER, edge, head, size)
+    bottom = teeth("lowerTeeth", LOWER, edge + size * np.array([0.0, OVERBITE_M, -OVERJET_M]), jaw, size)
     return join("mouth", [top, _follow(bottom, person, "helper-lower-teeth"), _tongue(person, jaw)])
 
 
@@ -80,7 +79,7 @@ def lashes_part(
     joints, weights = influences
     parts = []
     for side in "lr":
-        for strip, count, length in LASHES:
+        for strip, count, length in person.identity.lashes.strips:
             quads = person.mesh.quads[person.mesh.groups == f"helper-{side}-eyelashes-{strip}"]
             lift, triangles = hairs(strip_grid(quads, near), count, length, len(person.vertices), rng)
             at = lift @ person.vertices

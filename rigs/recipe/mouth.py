@@ -52,8 +52,8 @@ _ROWS = (
 )
 
 
-def teeth(name: str, arch: Arch, front: NDArray[np.float64], joint: int) -> Part:
-    """The teeth of one arch; `front` (3,) [m] is the middle of the cutting edge."""
+def teeth(name: str, arch: Arch, front: NDArray[np.float64], joint: int, scale: float) -> Part:
+    """The teeth of one arch, `scale` times an adult's; `front` (3,) [m] is the middle of the cutting edge."""
     columns = _columns(arch)
     half = len(columns.place)
     side = np.r_[-np.ones(half - 1), np.ones(half)]
@@ -69,7 +69,7 @@ def teeth(name: str, arch: Arch, front: NDArray[np.float64], joint: int) -> Part
         lowered = 0.12 * gap if 0.5 < height < 1.5 else 0.0
         rounded = 0.9 * gap if height < 0.2 else 0.0
         up = arch.rise * (columns.crown_mm[fold] * (height - lowered) + rounded) * 1e-3
-        positions.append(np.stack([flat[:, 0], up, flat[:, 1]], axis=1) + front)
+        positions.append(scale * np.stack([flat[:, 0], up, flat[:, 1]], axis=1) + front)
         uv.append(np.stack([columns.picture[fold], np.full(len(fold), 0.5 * row)], axis=1))
     triangles = _grid_triangles(len(_ROWS), len(side))
     triangles = triangles if arch.rise > 0 else triangles[:, ::-1]

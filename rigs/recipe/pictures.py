@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rigs.recipe.eyes import IRIS_DEG, RINGS_DEG
+from rigs.recipe.eyes import RINGS_DEG
 from rigs.recipe.mouth import CREST, picture_edges
 from rigs.recipe.noise import fractal, value_noise
 from rigs.recipe.paint import blend, smoothstep
@@ -14,25 +14,24 @@ from rigs.recipe.paint import blend, smoothstep
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from rigs.recipe.palette import Colour, Palette
+
 EYE_SIZE = 512
 MOUTH_SIZE = 512
-WHITE = (208.0, 201.0, 195.0)
 VEINS = (196.0, 128.0, 118.0)
-IRIS_OUTER = (62.0, 74.0, 78.0)
-IRIS_INNER = (128.0, 104.0, 70.0)
 PUPIL = (9.0, 8.0, 9.0)
 TOOTH = (232.0, 222.0, 202.0)
 GUM = (188.0, 104.0, 104.0)
 TONGUE = (186.0, 96.0, 94.0)
 
 
-def eye() -> NDArray[np.uint8]:
+def eye(palette: Palette, iris_deg: float) -> NDArray[np.uint8]:
     """(H, W, 3): the distance from the middle is the angle from the front, the edge is the last ring of the sphere."""
     grid = (np.arange(EYE_SIZE) + 0.5) / EYE_SIZE * 2 - 1
     x, y = (values.ravel() for values in np.meshgrid(grid, -grid))
     angle = np.hypot(x, y) * RINGS_DEG[-1]
-    colour = _sclera(x, y, angle)
-    colour = _iris(colour, x, y, angle)
+    colour = _sclera(palette, x, y, angle)
+    colour = _iris(colour, Iris(palette.iris_outer, palette.iris_inner, iris_deg), x, y, angle)
     glint = np.hypot(x * RINGS_DEG[-1] + 6.5, y * RINGS_DEG[-1] - 9.0)
     colour = blend(colour, (255.0, 255.0, 255.0), 0.9 * smoothstep(4.4, 3.0, glint))
     soft = np.hypot(x * RINGS_DEG[-1] - 7.0, y * RINGS_DEG[-1] + 8.5)
@@ -40,9 +39,11 @@ def eye() -> NDArray[np.uint8]:
     return _finish(colour, EYE_SIZE, EYE_SIZE)
 
 
-def _sclera(x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.float64]) -> NDArray[np.float64]:
+def _sclera(
+    palette: Palette, x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.float64]
+) -> NDArray[np.float64]:
     place = np.stack([x, y, np.zeros_like(x)], axis=1)
-    colour = np.tile(np.array(WHITE), (len(x), 1))
+    colour = np.tile(np.array(palette.eye_white), (len(x), 1))
     colour = blend(colour, VEINS, 0.45 * smoothstep(38, 90, angle))
     turn = np.arctan2(y, x)
     thread = np.abs(fractal(np.stack([turn * 7, angle * 0.03, np.zeros_like(x)], axis=1) + 0.4 * place, 1.0, 3, seed=5))
@@ -52,20 +53,28 @@ def _sclera(x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.fl
     return np.asarray(colour * ((1 - above) * (1 - aside))[:, None])
 
 
+class Iris(NamedTuple):
+    """Colours at the rim and at the pupil, and the radius as an angle from the front."""
+
+    outer: Colour
+    inner: Colour
+    deg: float
+
+
 def _iris(
-    colour: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.float64]
+    colour: NDArray[np.float64], iris: Iris, x: NDArray[np.float64], y: NDArray[np.float64], angle: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     turn = np.arctan2(y, x)
     ring = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
-    reach = angle / IRIS_DEG
+    reach = angle / iris.deg
     fibres = value_noise(ring * 11 + reach[:, None] * [0, 0, 1.6], 1.0, seed=7) * 0.6
     fibres += value_noise(ring * 26 + reach[:, None] * [0, 0, 1.2], 1.0, seed=8) * 0.4
     inner = smoothstep(0.78, 0.36, reach + 0.12 * fibres)
-    shade = np.array(IRIS_OUTER) + inner[:, None] * (np.array(IRIS_INNER) - IRIS_OUTER)
+    shade = np.array(iris.outer) + inner[:, None] * (np.array(iris.inner) - iris.outer)
     shade = shade * (1.12 + 0.38 * fibres)[:, None]
     shade = (
         shade
-        * (1 - 0.62 * smoothstep(0.82, 1.0, reach) - 0.30 * smoothstep(0.1, 0.9, y * RINGS_DEG[-1] / IRIS_DEG))[:, None]
+        * (1 - 0.62 * smoothstep(0.82, 1.0, reach) - 0.30 * smoothstep(0.1, 0.9, y * RINGS_DEG[-1] / iris.deg))[:, None]
     )
     colour = blend(colour, shade, smoothstep(1.06, 0.97, reach))
     return blend(colour, PUPIL, smoothstep(0.43, 0.37, reach + 0.015 * fibres))

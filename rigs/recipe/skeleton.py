@@ -15,10 +15,6 @@ if TYPE_CHECKING:
     from rigs.recipe.person import Person
 
 NECK, HEAD, JAW = "neck", "head", "jaw"
-JAW_FROM_EYES_M = np.array([0.0, -0.0267, -0.0555])
-"""The ear-to-ear hinge in front of the ear canals, seen from the middle between the eyes."""
-HEAD_FROM_EYES_M = np.array([0.0, -0.037, -0.078])
-NECK_FROM_EYES_M = np.array([0.0, -0.108, -0.095])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +35,12 @@ class Skeleton:
 def skeleton(person: Person, sites: dict[str, NDArray[np.float64]]) -> Skeleton:
     """All joints of the rig, for the place (3,) [m] of every site."""
     middle = person.eye_middle()
-    places = {NECK: middle + NECK_FROM_EYES_M, HEAD: middle + HEAD_FROM_EYES_M, JAW: middle + JAW_FROM_EYES_M}
+    proportions = person.identity.proportions
+    places = {
+        NECK: middle + proportions.neck_m,
+        HEAD: middle + proportions.head_m,
+        JAW: middle + proportions.jaw_m,
+    }
     places |= person.eyes() | sites
     names = tuple(places)
     parents = {NECK: -1, HEAD: 0} | {site: names.index(JAW) for site in sites if rides_jaw(site)}
