@@ -40,7 +40,7 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv, udp://HOST:PORT ...; may be g
 @click.option("--record", type=click.Path(), metavar="TAKE", help="Also record a live source, to a new .mcap file.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long.")
 @click.option("--drive", type=click.Choice(["joints", "shapes", "both"]), default="joints", show_default=True)
-@click.option("--smooth", type=click.Choice(["none", "one-euro", "pd"]), help="[one-euro for a camera, else none]")
+@click.option("--smooth", type=click.Choice(["none", "one-euro", "pd"]), help="[none for joints from markers, else one-euro]")
 @click.option(
     "--jaw", type=click.Choice(["signed", "cosine"]), help="How the jaw's angle is read.  [as the performer's]"
 )
@@ -126,7 +126,8 @@ def _session(where: str, options: dict[str, Any]) -> Session:
     layout = load_layout(options["layout"]) if options["layout"] else None
     performer = load_performer(options["performer"]) if options["performer"] else None
     updates = PerformerWatch(Path(options["performer"])) if performer else lambda: None
-    smooth: Smoothing = options["smooth"] or ("one-euro" if are_landmarks(where) else "none")
+    noisy = are_landmarks(where) or options["drive"] != "joints"  # weights amplify what markers tremble
+    smooth: Smoothing = options["smooth"] or ("one-euro" if noisy else "none")
     how = SolveSettings(options["drive"], smooth, options["jaw"])
     return Session(load_rig(options["rig"]), performer, layout, how, updates)
 
