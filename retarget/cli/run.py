@@ -40,7 +40,7 @@ SINKS_HELP = "window, out.mp4, frames/, poses.csv, udp://HOST:PORT ...; may be g
 @click.option("--record", type=click.Path(), metavar="TAKE", help="Also record a live source, to a new .mcap file.")
 @click.option("--seconds", type=click.FloatRange(min=0, min_open=True), help="Stop after so long.")
 @click.option("--drive", type=click.Choice(["joints", "shapes", "both"]), default="joints", show_default=True)
-@click.option("--smooth", type=click.Choice(["none", "one-euro", "pd"]), help="[none for joints from markers, else one-euro]")
+@click.option("--smooth", type=click.Choice(["none", "one-euro", "pd"]), help="[none for joints by markers]")
 @click.option(
     "--jaw", type=click.Choice(["signed", "cosine"]), help="How the jaw's angle is read.  [as the performer's]"
 )

@@ -44,7 +44,7 @@ class Conversation:
     def session(self, take: Take) -> NatNetSession:
         """A decoder that knows what the server says in this take."""
         session = NatNetSession(self.server, self.wanted)
-        if self.guessed:
+        if self.guessed and self.wanted is not None:
             session.bitstream = self.wanted
         for datagram in self.told_first:
             session.receive(datagram.payload, take.start_s)

@@ -59,7 +59,8 @@ def _cost_of_a_frame() -> Iterator[Row]:
     encoding_s = seconds_per_call(datagram, 1000)
     waiting = iter([datagram() for _ in range(1100)])
     receiving_s = seconds_per_call(lambda: wire.session.receive(next(waiting), wire.now_s), 1000)
-    yield Row("24 markers, 4.1: datagram to named and timed frame", 1e6 * receiving_s, "us", *_natnet_decode(datagram()))
+    peer = _natnet_decode(datagram())
+    yield Row("24 markers, 4.1: datagram to named and timed frame", 1e6 * receiving_s, "us", *peer)
     yield Row("24 markers, 4.1: frame to datagram", 1e6 * encoding_s, "us")
 
 
@@ -75,10 +76,10 @@ def _natnet_decode(datagram: bytes) -> tuple[str, float | None]:
 
 def _stream_of_the_jaw() -> Iterator[Row]:
     frames = _jaw()
-    with NatNetServer(MarkerReel(frames), ServerSettings(command_port=0, speed=4.0)) as server:
-        with NatNetSource(url(server)) as source:
-            arrived = [(frame, time.monotonic()) for frame in source]
-            stats, clock = source.stats, source.session.clock
+    settings = ServerSettings(command_port=0, speed=4.0)
+    with NatNetServer(MarkerReel(frames), settings) as server, NatNetSource(url(server)) as source:
+        arrived = [(frame, time.monotonic()) for frame in source]
+        stats, clock = source.stats, source.session.clock
     waits_ms = 1e3 * np.array([taken_s - frame.received_s for frame, taken_s in arrived])
     ages_ms = 1e3 * np.array([frame.received_s - frame.time_s for frame, _ in arrived])
     steps_us = 1e6 * np.diff([frame.time_s for frame, _ in arrived])

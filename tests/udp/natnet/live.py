@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from retarget.frames import MarkerFrame, MarkerLayout
 from retarget.udp.natnet.reel import MarkerReel
 from retarget.udp.natnet.server import NatNetServer, ServerSettings
 from retarget.udp.sockets import LOOPBACK, open_multicast_receiver
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 GROUP = "239.255.42.99"
 
