@@ -367,6 +367,8 @@ def _jaw(table: Table) -> PerformerJaw:
     length = np.linalg.norm(axis)
     if length < 1e-6:
         raise table.wrong("axis", "must have a direction")
+    if abs(length - 1) > 1e-6:  # a person's; ours is of unit length to the digits written, and stays as it stands there
+        axis = axis / length
     limits = table.number("min_deg"), table.number("max_deg")
     if not -180 <= limits[0] <= 0 <= limits[1] <= 180:
         raise table.wrong("max_deg", "and min_deg must lie on either side of 0, within 180")
@@ -374,7 +376,7 @@ def _jaw(table: Table) -> PerformerJaw:
     if mode not in get_args(JawMode):
         raise table.wrong("mode", f"must be {' or '.join(get_args(JawMode))}")
     return PerformerJaw(
-        axis=axis / length,
+        axis=axis,
         pivot=table.array("pivot", (3,)),
         gain=table.number("gain"),
         min_rad=math.radians(limits[0]),
