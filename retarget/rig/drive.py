@@ -63,6 +63,8 @@ class Drive:
         """
         if mode not in get_args(DriveMode):
             raise InputError(f"There is no way to drive a face called {mode!r}; there are: {_list(DriveMode)}.")
+        if mode == "joints":
+            _check_joints(rig)
         self._mapping = JointMapping(rig, layout, performer, T_world_reference)
         self._shapes = None if mode == "joints" else _ShapeDrive(rig, layout, self._mapping.sites, mode)
         self._smooth = PoseSmoother(rig, self._mapping.sites, smooth)
@@ -185,6 +187,13 @@ def _line_up(rig: Rig, joint: int) -> list[int]:
     while rig.joints.parents[line[-1]] >= 0:
         line.append(int(rig.joints.parents[line[-1]]))
     return line
+
+
+def _check_joints(rig: Rig) -> None:
+    """InputError where all sites are mere places on the mesh, so that no joint would move it."""
+    joints = [site.joint for site in rig.sites.values()]
+    if joints and rig.shape_names and np.isnan(rig.joints.T_joint_mesh[joints]).all():
+        raise InputError(f"The rig {rig.name!r} has no joints at its sites; drive its blend shapes: --drive shapes.")
 
 
 def _list(choices: object) -> str:

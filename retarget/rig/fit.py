@@ -73,6 +73,8 @@ def performer_from_neutral(
 
 def _shared_markers(layout: MarkerLayout, neutral: Array, rig: Rig) -> list[int]:
     """Indices of the markers that were seen and have a site on the rig."""
+    if not rig.sites:
+        raise InputError(f"The rig {rig.name!r} has no sites for markers to drive; add them to [sites] in {rig.path}.")
     seen = np.isfinite(neutral.sum(axis=1)).tolist()
     shared = [i for i, site in enumerate(layout.sites) if site in rig.sites and seen[i]]
     places = {layout.sites[i]: rig.sites[layout.sites[i]].rest for i in shared}

@@ -4,6 +4,7 @@ rig.toml, version 1::
 
     name = "human"
     mesh = "human.glb"                 # beside this file
+    faces = "+z"                       # or "-z": where the character looks in the mesh; may be left out
     [joints]                           # names of joints in the GLB; head must be there
     head = "head"
     neck = "neck"
@@ -16,6 +17,9 @@ rig.toml, version 1::
     max_deg = 35
     [sites]                            # site = joint that a marker there drives
     noseTip = "noseTip"
+    chin = [0.0, 0.05, 0.1]            # or a place on the mesh [m], for a mesh that blend shapes alone can move there
+    [shapes]                           # the mesh's blend shapes by our names; see `retarget.rig.shape_names`
+    jawOpen = "mouth_a"
     [responses]                        # may be left out; see `retarget.rig.responses`
     jawOpen = { measure = "mouth_width", curve = "ramp", start = 0.02, end = 0.3 }
     [secondary]                        # joints that trail, may be left out; see `retarget.rig.secondary`
@@ -27,6 +31,7 @@ rig.toml, version 1::
 from __future__ import annotations
 
 import difflib
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -35,15 +40,17 @@ import numpy as np
 
 from retarget.errors import InputError
 from retarget.rig.glb import read_glb
+from retarget.rig.library import RIG_FILE, all_rigs, shipped_rigs
 from retarget.rig.model import Jaw, Rig, Site
 from retarget.rig.nodes import read_nodes, read_skeleton
 from retarget.rig.responses import read_responses
 from retarget.rig.secondary import read_gains
+from retarget.rig.shape_names import read_shape_names, renamed
 from retarget.rig.surfaces import read_surfaces
 from retarget.toml_table import read_table
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Mapping
 
     from numpy.typing import NDArray
 
@@ -53,12 +60,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-RIG_FILE = "rig.toml"
+KEYS = ("version", "name", "mesh", "faces", "joints", "jaw", "sites", "shapes", "responses", "secondary", "licence")
+LOG = logging.getLogger(__name__)
+T_RIG_FILE: dict[str, Array | None] = {"+z": None, "-z": np.diag([-1.0, 1.0, -1.0, 1.0])}
+"""By the direction in which the character looks in the mesh."""
+JAW_RIDERS = ("lipLower", "chin", "mandible")
+"""Beginnings of the names of sites whose markers ride on the jaw."""
 
 
 @dataclass(frozen=True, slots=True)
 class RigSummary:
-    """One line about a rig that ships with the package."""
+    """One line about a rig that can be had by name."""
 
     name: str
     path: Path
@@ -72,7 +84,7 @@ class RigSummary:
 
 
 def load_rig(name_or_path: str) -> Rig:
-    """The rig that ships under this name, or that of a folder with a rig.toml, or of a rig.toml.
+    """The rig that ships or was added under this name, or that of a folder with a rig.toml, or of a rig.toml.
 
     Raises InputError where there is none, or where its files cannot be used.
     """
@@ -80,8 +92,18 @@ def load_rig(name_or_path: str) -> Rig:
 
 
 def available_rigs() -> tuple[RigSummary, ...]:
-    """The rigs that ship with the package, by name; reads them all."""
-    return tuple(_summary(path) for path in _shipped().values())
+    """The rigs that ship with the package and those that the user has added; reads them all.
+
+    One of the user's that cannot be read is passed over with a warning.
+    """
+    summaries = [_summary(path) for path in shipped_rigs().values()]
+    for name, path in all_rigs().items():
+        if name not in shipped_rigs():
+            try:
+                summaries.append(_summary(path))
+            except InputError as error:
+                LOG.warning("The rig %r cannot be used: %s", name, error)
+    return tuple(summaries)
 
 
 def _summary(path: Path) -> RigSummary:
@@ -97,18 +119,11 @@ def _summary(path: Path) -> RigSummary:
     )
 
 
-def _shipped() -> dict[str, Path]:
-    """Name of the folder to its rig.toml."""
-    import rigs
-
-    return {path.parent.name: path for path in sorted(Path(rigs.__file__).parent.glob(f"*/{RIG_FILE}"))}
-
-
 def _find(name_or_path: str) -> Path:
     """The rig.toml that is meant."""
-    shipped = _shipped()
-    if name_or_path in shipped:
-        return shipped[name_or_path]
+    known = all_rigs()
+    if name_or_path in known:
+        return known[name_or_path]
     path = Path(name_or_path)
     if path.is_dir():
         path /= RIG_FILE
@@ -117,7 +132,8 @@ def _find(name_or_path: str) -> Path:
     if path.suffix == ".glb" and path.is_file():
         return _beside(path)
     raise InputError(
-        f"There is no rig {name_or_path!r}{_near(name_or_path, shipped)}. Name one that ships ({', '.join(shipped)}), "
+        f"There is no rig {name_or_path!r}{_near(name_or_path, known)}. Name one that ships "
+        f"({', '.join(shipped_rigs())}), one that you have added{_list(set(known) - set(shipped_rigs()))}, "
         f"a folder with a {RIG_FILE}, or such a file."
     )
 
@@ -135,29 +151,33 @@ def _beside(mesh: Path) -> Path:
 
 def _read_rig(path: Path) -> Rig:
     root = read_table(path, "rig file")
-    root.only("version", "name", "mesh", "joints", "jaw", "sites", "responses", "secondary", "licence")
+    root.only(*KEYS)
     if root.values.get("version", 1) != 1:
         raise root.wrong("version", "must be 1, the only version there is")
     named = _named_joints(root)
     file = root.string("mesh")
     trailing = root.table("secondary").values
-    mesh = _read_mesh(path.parent / file, {table.string(key) for table, key in named.values()} | set(trailing))
+    names = {table.string(key) for table, key in named.values()} | set(trailing)
+    mesh = _read_mesh(path.parent / file, names, T_RIG_FILE[_facing(root)], _placed(root))
     joints = mesh.joints
+    shapes = read_shape_names(root.table("shapes"), mesh.shape_names)
+    shape_names = tuple(shapes) if "shapes" in root.values else mesh.shape_names
     places = {what: _joint(mesh, table, key, file) for what, (table, key) in named.items()}
+    places |= {f"sites.{site}": joints.index(place.joint) for site, place in mesh.placed.items()}
     origin = joints.T_rig_joint[places["head"], :3, 3]
     return Rig(
         name=root.string("name"),
         path=path,
         joints=joints,
-        surfaces=mesh.surfaces,
-        shape_names=mesh.shape_names,
+        surfaces=renamed(mesh.surfaces, mesh.shape_names, shapes) if "shapes" in root.values else mesh.surfaces,
+        shape_names=shape_names,
         sites=_sites(root.table("sites"), joints, places, origin),
         head_joint=places["head"],
         neck_joint=places.get("neck"),
         eye_joints=(places.get("eye_left"), places.get("eye_right")),
         jaw=_jaw(root.table("jaw"), joints, places["jaw"], origin) if "jaw" in places else None,
         licence=_licence(root.table("licence")),
-        responses=read_responses(root.table("responses"), mesh.shape_names),
+        responses=read_responses(root.table("responses"), shape_names),
         secondary=_secondary(root.table("secondary"), mesh, places),
     )
 
@@ -171,7 +191,36 @@ def _named_joints(root: Table) -> dict[str, tuple[Table, str]]:
     if "jaw" in root.values:
         jaw.only("joint", "axis", "min_deg", "max_deg")
         named["jaw"] = (jaw, "joint")
-    return named | {f"sites.{site}": (sites, site) for site in sites.values}
+    return named | {f"sites.{site}": (sites, site) for site, value in sites.values.items() if isinstance(value, str)}
+
+
+class _Place(NamedTuple):
+    """A site on the mesh that has no joint of the file's."""
+
+    joint: str
+    """Of the joint that is added for it."""
+    position: Array
+    """(3,) [m], ``rig``."""
+    parent: str
+
+
+def _placed(root: Table) -> dict[str, _Place]:
+    """Sites that are given by a place; they hang on the head, or on the jaw where markers there ride on it."""
+    sites, joints = root.table("sites"), root.table("joints")
+    head = joints.string("head")
+    jaw = root.table("jaw").string("joint") if "jaw" in root.values else head
+    return {
+        site: _Place(f"{site}.place", sites.array(site, (3,)), jaw if site.startswith(JAW_RIDERS) else head)
+        for site, value in sites.values.items()
+        if not isinstance(value, str)
+    }
+
+
+def _facing(root: Table) -> str:
+    facing = root.string("faces") if "faces" in root.values else "+z"
+    if facing not in T_RIG_FILE:
+        raise root.wrong("faces", f"must be one of {', '.join(T_RIG_FILE)}")
+    return facing
 
 
 class _Mesh(NamedTuple):
@@ -182,15 +231,22 @@ class _Mesh(NamedTuple):
     shape_names: tuple[str, ...]
     node_names: tuple[str, ...]
     """Of all nodes: what could be a joint."""
+    placed: Mapping[str, _Place]
+    """Sites without a joint of the file's."""
 
 
-def _read_mesh(path: Path, named: Collection[str]) -> _Mesh:
-    """The GLB at `path`; `named` nodes are joints even without a skin."""
+def _read_mesh(
+    path: Path, named: Collection[str], T_rig_file: Array | None = None, placed: Mapping[str, _Place] | None = None
+) -> _Mesh:
+    """The GLB at `path`; `named` nodes are joints even without a skin, and each of `placed` gets one."""
     glb = read_glb(path)
-    nodes = read_nodes(glb)
+    nodes = read_nodes(glb, T_rig_file)
     skeleton = read_skeleton(glb, nodes, named)
     surfaces, shape_names = read_surfaces(glb, nodes, skeleton)
-    return _Mesh(skeleton.joints(), surfaces, shape_names, nodes.names)
+    for place in (placed or {}).values():
+        if place.parent in skeleton.names:
+            skeleton.place(place.joint, place.parent, place.position)
+    return _Mesh(skeleton.joints(), surfaces, shape_names, nodes.names, placed or {})
 
 
 def _joint(mesh: _Mesh, table: Table, key: str, file: str) -> int:
@@ -252,6 +308,10 @@ def _below(joints: Joints, top: int) -> frozenset[int]:
         if parent == top or parent in found:
             found.add(j)
     return frozenset(found)
+
+
+def _list(names: Collection[str]) -> str:
+    return f" ({', '.join(sorted(names))})" if names else ""
 
 
 def _near(name: str, known: Collection[str]) -> str:

@@ -88,6 +88,19 @@ class Skeleton:
         self._bindings.append(T_joint_mesh)
         return twins[-1]
 
+    def place(self, name: str, parent: str, position: Array) -> None:
+        """Add a joint that no skin uses, at `position` (3,) [m], ``rig``, with the rest rotation of its `parent`."""
+        above = self._names.index(parent)
+        self._names.append(name)
+        self._parents.append(above)
+        self._T_rig_joint.append(transform(self._T_rig_joint[above][:3, :3], position))
+        self._bindings.append(None)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the joints so far."""
+        return tuple(self._names)
+
     def joints(self) -> Joints:
         """The joints with everything bound so far."""
         T_rig_joint = np.array(self._T_rig_joint)
@@ -105,8 +118,11 @@ class Skeleton:
         )
 
 
-def read_nodes(glb: Glb) -> Nodes:
-    """The hierarchy of the default scene; InputError where it is no forest."""
+def read_nodes(glb: Glb, T_rig_file: Array | None = None) -> Nodes:
+    """The hierarchy of the default scene; InputError where it is no forest.
+
+    `T_rig_file` (4, 4) turns a file whose character does not look along +Z.
+    """
     items = glb.document.tables("nodes")
     parents = [-1] * len(items)
     children = [item.integers("children") for item in items]
@@ -117,10 +133,11 @@ def read_nodes(glb: Glb) -> Nodes:
                 raise InputError(f"{items[child].place} has two parents; {DAMAGED}.")
             parents[child] = parent
     order = _parents_first(glb, parents, children)
+    T_rig_root = np.eye(4) if T_rig_file is None else T_rig_file
     T_rig_node = np.tile(np.eye(4), (len(items), 1, 1))
     for n in order:
         local = _local_transform(items[n])
-        T_rig_node[n] = local if parents[n] < 0 else T_rig_node[parents[n]] @ local
+        T_rig_node[n] = (T_rig_root if parents[n] < 0 else T_rig_node[parents[n]]) @ local
         if np.abs(T_rig_node[n]).max() > LARGEST:
             raise InputError(f"{items[n].place} is placed or scaled beyond all measure; {DAMAGED}.")
     names = tuple(item.text("name", "") or f"node{n}" for n, item in enumerate(items))
@@ -128,13 +145,17 @@ def read_nodes(glb: Glb) -> Nodes:
 
 
 def read_skeleton(glb: Glb, nodes: Nodes, named: Collection[str]) -> Skeleton:
-    """Joints are the nodes of all skins and those `named`; InputError where two of them share a name."""
+    """Joints are the nodes of all skins and those `named`, or the roots where there are none of either; InputError
+    where two of them share a name.
+    """
     listed = {n for skin in glb.document.tables("skins") for n in skin.integers("joints")}
     inside = set(nodes.order)
     for n in listed - inside:
         raise InputError(f"{glb.path.name}: a skin uses nodes[{n}], which is not in the scene; export them together.")
     wanted = set(named) - {nodes.names[n] for n in listed}  # a mesh is often named as the joint that it hangs on
     chosen = listed | {n for n in inside if nodes.names[n] in wanted}
+    if not chosen:  # without a skin and without names all hangs on the roots
+        chosen = {n for n in inside if nodes.parents[n] < 0}
     seen: set[str] = set()
     for n in chosen:
         if nodes.names[n] in seen:

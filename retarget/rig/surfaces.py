@@ -50,12 +50,13 @@ def read_surfaces(glb: Glb, nodes: Nodes, skeleton: Skeleton) -> tuple[tuple[Sur
     drawn = [n for n in nodes.order if "mesh" in glb.entry("nodes", n)]
     # Skins first: where a joint carries a rigid piece too, the skin's bind matrix is the joint's own.
     drawn.sort(key=lambda n: "skin" not in glb.entry("nodes", n))
-    if not drawn or "skin" not in glb.entry("nodes", drawn[0]):
-        raise InputError(
-            f"{glb.path.name} has no skin, so nothing would move its mesh; bind it to an armature and export that too."
-        )
     meshes = [glb.entry("meshes", glb.entry("nodes", n).integer("mesh")) for n in drawn]
-    shape_names = tuple(dict.fromkeys(name for mesh in meshes for name in _shape_names(mesh)))
+    shape_names = tuple(dict.fromkeys(name for mesh in meshes for name in target_names(mesh)))
+    if not shape_names and (not drawn or "skin" not in glb.entry("nodes", drawn[0])):
+        raise InputError(
+            f"{glb.path.name} has no skin and no blend shapes, so nothing would move its mesh; bind it to an armature "
+            "or give it blend shapes, and export those too."
+        )
     reader = _Reader(glb, shape_names)
     surfaces = []
     for n, mesh in zip(drawn, meshes, strict=True):
@@ -79,7 +80,7 @@ class _Reader:
         """One surface for every primitive of the mesh, named after its node."""
         primitives = [p for p in mesh.tables("primitives") if p.integer("mode", TRIANGLE_MODES[0]) in TRIANGLE_MODES]
         names = [name] if len(primitives) == 1 else [f"{name}.{i}" for i in range(len(primitives))]
-        targets = _shape_names(mesh)
+        targets = target_names(mesh)
         return [self._surface(p, n, targets, binding) for p, n in zip(primitives, names, strict=True)]
 
     def _surface(self, primitive: Fields, name: str, targets: list[str], binding: _Binding) -> Surface:
@@ -176,7 +177,7 @@ def _normals(
     return np.where(length > 0, turned / np.where(length > 0, length, 1.0), computed).astype(np.float32)
 
 
-def _shape_names(mesh: Fields) -> list[str]:
+def target_names(mesh: Fields) -> list[str]:
     """Names of a mesh's blend shapes: `targetNames` of its extras or a primitive's, else its name and a number."""
     primitives = mesh.tables("primitives")
     count = max((len(p.tables("targets")) for p in primitives), default=0)
