@@ -1,0 +1,1 @@
+"""Bodies in the plane: reading, measuring, converting, drawing."""
