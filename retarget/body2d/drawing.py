@@ -39,7 +39,7 @@ def write_film(path: Path, recording: Recording, card: Card, settings: Settings)
     """Write an MP4 at the film's own rate, everybody in it; returns its pictures. Raises OutputError."""
     cv2 = import_module("cv2")
     places = _places(recording, settings, FILM_SIZE)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _make_folder(path)
     film = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), settings.fps, FILM_SIZE)
     if not film.isOpened():
         raise OutputError(f"The video {path} cannot be written: choose another place that ends in .mp4.")
@@ -58,7 +58,7 @@ def write_picture(path: Path, recording: Recording, card: Card, settings: Settin
     places = _places(recording, settings, size)
     moments = np.unique(np.linspace(0, len(places) - 1, stances).round().astype(int))
     drawn = [draw(places[at], card, settings.min_confidence, size) for at in moments.tolist()]
-    path.parent.mkdir(parents=True, exist_ok=True)
+    _make_folder(path)
     done, data = import_module("cv2").imencode(".png", np.concatenate(drawn, axis=1))
     try:
         path.write_bytes(data.tobytes())
@@ -78,6 +78,13 @@ def draw(places: Array, card: Card, min_confidence: float, size: tuple[int, int]
         for bone in card.bones:
             _draw_bone(cv2, picture, seen, (bone.start, bone.end), colour)
     return picture
+
+
+def _make_folder(path: Path) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"The folder of {path} cannot be made ({error.strerror}): choose another place.") from None
 
 
 def _draw_bone(cv2: Any, picture: Picture, seen: Array, ends: tuple[float, float], colour: Sequence[int]) -> None:
