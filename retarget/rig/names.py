@@ -75,7 +75,7 @@ _BONES = {
 }
 """Folded names by role: VRM humanoid (``leftEye``), Mixamo (``mixamorig:LeftEye``), MakeHuman (``eye.L``, ``neck01``),
 Ready Player Me, Unreal, VRoid (``J_Adj_L_FaceEye``)."""
-_PREFIXES = re.compile(r"^(mixamorig\d*|armature|character\d*|cc_base|def|org|bip0*1|bone|jbipc|jadj|jbip)+")
+_PREFIXES = re.compile(r"^(mixamorig\d*|armature|character\d*|ccbase|def|org|bip0*1|bone|jbipc|jadj|jbip)+")
 _HEAD_FIRST = re.compile(r"^(l|r)(faceeye|eye)$")
 
 
