@@ -151,12 +151,27 @@ def _joints(glb: Glb, vrm: Vrm | None, nodes: Nodes) -> tuple[dict[str, str], li
     joints = bone_roles(nodes.names[n] for n in candidates)
     if vrm:
         joints |= {role: nodes.names[n] for role, n in vrm.bones.items() if n in nodes.order}
+    if not listed:
+        return _joints_without_skin(glb, joints, nodes)
     if "head" in joints:
         return joints, []
-    if not candidates:
-        raise InputError(f"{glb.path.name} has no nodes, so there is nothing to move; export the scene with its mesh.")
     root = nodes.names[candidates[0]]
     return {"head": root} | joints, [f"No joint is named as a head; {root!r} is taken for it."]
+
+
+def _joints_without_skin(glb: Glb, joints: dict[str, str], nodes: Nodes) -> tuple[dict[str, str], list[str]]:
+    """Bones move nothing but what hangs on them, so the head is what carries the mesh."""
+    carrying = [n for n in nodes.order if "mesh" in glb.entry("nodes", n)]
+    if not carrying:
+        raise InputError(f"{glb.path.name} shows no mesh, so there is nothing to move; export the scene with its mesh.")
+    line = [carrying[0]]
+    while nodes.parents[line[-1]] >= 0:
+        line.append(nodes.parents[line[-1]])
+    above = [nodes.names[n] for n in line]
+    if joints.get("head") in above:
+        return joints, []
+    eyes = {role: joint for role, joint in joints.items() if role.startswith("eye")}
+    return {"head": above[-1]} | eyes, [f"Without a skin the whole model turns with the head, by {above[-1]!r}."]
 
 
 def _looks_back(vrm: Vrm | None, joints: Mapping[str, str], nodes: Nodes) -> bool:

@@ -107,6 +107,17 @@ def test_bare_blend_shapes_get_sites_near_the_true_ones(name: Callable[[str], st
     assert max(apart_mm) < 10
 
 
+def test_a_mesh_without_skin_turns_with_the_head_as_a_whole(tmp_path: Path) -> None:
+    rig = load_rig(str(adopt(bare(tmp_path / "a.glb"), tmp_path / "rigs").folder))
+    pose = make_pose(rig)
+    rotations = pose.rotations.copy()
+    rotations[rig.head_joint] = [0, 1, 0, 0]
+    turned = Skin(rig)(replace(pose, rotations=rotations)).positions
+    pivot = rig.joints.T_rig_joint[rig.head_joint, :3, 3]
+    for surface, positions in zip(rig.surfaces, turned, strict=True):
+        np.testing.assert_allclose(positions - pivot, (surface.positions - pivot) * [-1, 1, -1], atol=1e-6)
+
+
 def test_a_rig_without_site_joints_is_driven_by_its_shapes_and_refuses_the_joints(tmp_path: Path) -> None:
     rig = load_rig(str(adopt(bare(tmp_path / "a.glb"), tmp_path / "rigs").folder))
     layout = face_layout("all", ALL_SITES)
