@@ -23,7 +23,7 @@ COMMANDS = {
     "models": "List or fetch the models that find landmarks in pictures.",
     "remote": "Tell a NatNet server to record or to play back.",
     "bench": "Print figures beside those of other programs.",
-    "rigs": "List the rigs that can be driven.",
+    "rigs": "List the rigs that can be driven, or add one.",
 }
 
 
