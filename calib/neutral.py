@@ -103,7 +103,7 @@ def _one_frame(recording: Recording) -> Array:
 
 def _spreads(laid: Array, frames: int) -> Array:
     """(W, M) [m]: RMS distance of each marker from its mean, over each window of `frames` frames; NaN where unseen."""
-    half = frames // 2
+    half = (frames - 1) // 2  # the window 2 half + 1 fits into the recording even where that is just as long
     centred = laid - np.nanmedian(np.where(np.isfinite(laid).any(axis=0), laid, 0.0), axis=0)  # keeps sums small
     sums, seen = window_sums(centred, half)
     squares, _ = window_sums(centred**2, half)
@@ -123,7 +123,7 @@ def _score(spreads: Array, laid: Array) -> Array:
 
 
 def _still_face(recording: Recording, laid: Array, at: int, frames: int, score: float) -> StillFace:
-    stretch = slice(at, min(at + 2 * (frames // 2) + 1, len(laid)))
+    stretch = slice(at, min(at + 2 * ((frames - 1) // 2) + 1, len(laid)))
     near = _near(laid[stretch], geometric_median(laid[stretch]))
     seen = np.isfinite(near.sum(axis=2)).any(axis=0)
     centre, noise = np.full(laid.shape[1:], np.nan), np.full(laid.shape[1], np.nan)

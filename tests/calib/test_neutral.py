@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from calib.neutral import find_neutral, geometric_median
+from calib.neutral import _spreads, find_neutral, geometric_median
 from retarget import geometry
 from retarget.errors import InputError
 from tests.calib.truth import recording
@@ -86,3 +86,9 @@ def test_the_geometric_median_does_not_follow_outliers_and_knows_what_was_never_
     centre = geometric_median(points)
     np.testing.assert_allclose(centre[0], 0.0, atol=1e-4)
     assert np.isnan(centre[1]).all()
+
+
+@pytest.mark.parametrize("frames", [239, 240, 241])
+def test_a_recording_just_as_long_as_the_stretch_has_one(frames: int) -> None:
+    laid = np.random.default_rng(1).normal(scale=1e-4, size=(frames, 5, 3))
+    assert len(_spreads(laid, frames)) >= 1
